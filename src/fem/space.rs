@@ -30,14 +30,13 @@ pub struct Space<const D: usize> {
     pub cells: Vec<u32>,
     /// Whether this is the meridian of a body of revolution, where x is the radius and y runs along the axis.
     pub axisymmetric: bool,
-    /// Body node of each mesh point that is one; unknown in a part of a body.
+    /// Body node of each vertex of the mesh; unknown in a part of a body.
     #[serde(skip)]
     from_mesh: Numbering,
-    /// First of the nodes inside each edge for the [point](edge_point) of the mesh that stands for the edge, unless
-    /// nodes of edges are points themselves. They lie in the direction from the end with the lower number in the mesh
-    /// to the other one.
+    /// First of the nodes inside each edge for the [point](edge_point) of the mesh that stands for the edge. They lie in
+    /// the direction from the end with the lower number in the mesh to the other one.
     #[serde(skip)]
-    edges: Option<Numbering>,
+    edges: Numbering,
     /// Area (volume) of all cells, once it has been requested.
     #[serde(skip)]
     measure: OnceCell<f64>,
@@ -47,15 +46,11 @@ impl<const D: usize> Space<D> {
     /// Make the space of `order` on the cells of `group` (of dimension `D`). The mesh is not linear unless `order` is
     /// 1.
     ///
-    /// Vertices are points of the mesh, and so are mid-edge nodes on a mesh of order two. Other nodes lie on the map of
-    /// the cell.
+    /// Vertices are points of the mesh, and other nodes lie on the map of the cell.
     pub fn new(mesh: &Mesh<D>, group: &Group, order: Order) -> Self {
         let stride = element::node_count(D + 1, order);
-        let is_whole = order == Order::P1 || order.max(mesh.order) == Order::P2;
-        let own = if is_whole { stride } else { D + 1 };
         let cells = || group.connectivity.chunks_exact(group.stride);
-        let inside = mesh.order.degree() - 1;
-        let edges = || cells().flat_map(move |cell| cell[D + 1..].chunks_exact(inside)).map(edge_point);
+        let edges = || cells().filter(move |_| order > Order::P1).flat_map(|cell| inside_edges::<D>(mesh, cell));
         let mut space = Space {
             order,
             nodes: Vec::new(),
@@ -64,34 +59,35 @@ impl<const D: usize> Space<D> {
             stride,
             cells: Vec::with_capacity(group.connectivity.len() / group.stride * stride),
             axisymmetric: false,
-            from_mesh: Numbering::new(cells().flat_map(move |cell| &cell[..own]).copied()),
-            edges: (!is_whole).then(|| Numbering::new(edges())),
+            from_mesh: Numbering::new(cells().flat_map(|cell| &cell[..=D]).copied()),
+            edges: Numbering::new(edges().map(edge_point)),
             measure: OnceCell::new(),
         };
-        let places = element::nodes::<3>(order).into_iter().skip(own);
+        let places = element::nodes::<3>(order).into_iter().skip(D + 1);
         let weights: Vec<Vec<f64>> = places.map(|l| mesh::weights(mesh.order, &l)).collect();
-        cells().for_each(|cell| space.add_cell(mesh, cell, own, &weights));
+        cells().for_each(|cell| space.add_cell(mesh, cell, &weights));
         space
     }
 
-    /// Add the nodes of a cell of the mesh. The first `own` points are nodes, and the others have these `weights` of
-    /// the points.
-    fn add_cell(&mut self, mesh: &Mesh<D>, cell: &[u32], own: usize, weights: &[Vec<f64>]) {
+    /// Add the nodes of a cell of the mesh. Those that are no vertices have these `weights` of its points.
+    fn add_cell(&mut self, mesh: &Mesh<D>, cell: &[u32], weights: &[Vec<f64>]) {
         let at = |point: &u32| mesh.points[*point as usize];
-        for point in &cell[..own] {
+        for point in &cell[..=D] {
             let (node, is_new) = self.from_mesh.number(*point, self.nodes.len() as u32);
             if is_new {
                 self.nodes.push(at(point));
             }
             self.cells.push(node);
         }
-        let Some(edges) = &mut self.edges else { return };
+        if self.order == Order::P1 {
+            return;
+        }
         let x: Vec<[f64; D]> = cell.iter().map(at).collect();
-        let place = |local: usize| element::interpolate(&x, &weights[local - own]);
+        let place = |local: usize| element::interpolate(&x, &weights[local - D - 1]);
         let count = self.order.degree() as u32 - 1;
-        for (inside, &(i, j)) in cell[D + 1..].chunks_exact(mesh.order.degree() - 1).zip(&EDGES) {
+        for (inside, &(i, j)) in inside_edges::<D>(mesh, cell).zip(&EDGES) {
             let is_forward = cell[i] < cell[j];
-            let (first, is_new) = edges.number(edge_point(inside), self.nodes.len() as u32);
+            let (first, is_new) = self.edges.number(edge_point(inside), self.nodes.len() as u32);
             if is_new {
                 let ends = if is_forward { [i, j] } else { [j, i] };
                 self.nodes.extend(element::inside_edge(self.order, D + 1, ends).map(place));
@@ -133,7 +129,14 @@ impl<const D: usize> Space<D> {
 
     /// Return the space with other nodes and cells, which has no link to points of the mesh.
     pub fn with(&self, nodes: Vec<[f64; D]>, cells: Vec<u32>) -> Self {
-        Space { nodes, cells, from_mesh: Numbering::default(), edges: None, measure: OnceCell::new(), ..*self }
+        Space {
+            nodes,
+            cells,
+            from_mesh: Numbering::default(),
+            edges: Numbering::default(),
+            measure: OnceCell::new(),
+            ..*self
+        }
     }
 
     /// Turn the space into the meridian of a body of revolution.
@@ -200,14 +203,15 @@ impl<const D: usize> Space<D> {
 
     /// Return the points of the mesh on the cells of the body.
     pub fn mesh_points(&self) -> impl Iterator<Item = u32> {
-        self.from_mesh.points().chain(self.edges.iter().flat_map(Numbering::points))
+        self.from_mesh.points().chain(self.edges.points())
     }
 
-    /// Return the point of the mesh that each node is, or [`Space::NO_POINT`].
-    pub fn points_of_nodes(&self) -> Vec<u32> {
+    /// Return the point of a mesh of some order that each node is, or [`Space::NO_POINT`].
+    pub fn points_of_nodes(&self, mesh: Order) -> Vec<u32> {
         let mut points = vec![Self::NO_POINT; self.nodes.len()];
-        for point in self.from_mesh.points() {
-            self.from_mesh.get(point).into_iter().for_each(|node| points[node as usize] = point);
+        let middles = (self.order.max(mesh) == Order::P2).then_some(&self.edges);
+        for numbering in [&self.from_mesh].into_iter().chain(middles) {
+            numbering.points().for_each(|at| numbering.get(at).into_iter().for_each(|node| points[node as usize] = at));
         }
         points
     }
@@ -300,14 +304,14 @@ impl<const D: usize> Space<D> {
     /// Return the body's nodes of one simplex of a mesh group, or `None` if it is not part of this body: vertices, then those on edges, which are
     /// not sorted above order two. Nodes inside the simplex are left out.
     pub(super) fn simplex(&self, points: &[u32], dimension: usize) -> Option<Vec<u32>> {
-        let vertices = dimension + 1;
-        let own = if self.order == Order::P2 && self.edges.is_none() { points.len() } else { vertices };
-        let mut nodes = points[..own].iter().map(|&point| self.from_mesh.get(point)).collect::<Option<Vec<u32>>>()?;
-        if let Some(edges) = self.edges.as_ref().filter(|_| dimension > 0) {
+        let (vertices, count) = (dimension + 1, self.order.degree() as u32 - 1);
+        let mut nodes =
+            points[..vertices].iter().map(|&point| self.from_mesh.get(point)).collect::<Option<Vec<u32>>>()?;
+        if count > 0 && dimension > 0 {
             let inside = 2 * (points.len() - vertices) / (dimension * vertices);
             for edge in points[vertices..].chunks_exact(inside) {
-                let first = edges.get(edge_point(edge))?;
-                nodes.extend(first..first + self.order.degree() as u32 - 1);
+                let first = self.edges.get(edge_point(edge))?;
+                nodes.extend(first..first + count);
             }
         }
         Some(nodes)
@@ -326,14 +330,21 @@ impl<const D: usize> Space<D> {
         };
         if group.dimension == 0 {
             // a set of nodes holds the edges whose middles it has
-            let of_edge = |point: &u32| self.edges.as_ref()?.get(*point);
-            let firsts = group.connectivity.iter().filter_map(of_edge);
+            let firsts = group.connectivity.iter().filter_map(|&point| self.edges.get(point));
             nodes.extend(firsts.flat_map(|first| first..first + self.order.degree() as u32 - 1));
         }
         nodes.sort_unstable();
         nodes.dedup();
         nodes
     }
+}
+
+/// Return the points inside each edge of a cell of the mesh, which is not linear.
+fn inside_edges<'a, const D: usize>(
+    mesh: &Mesh<D>,
+    cell: &'a [u32],
+) -> impl Iterator<Item = &'a [u32]> + Clone + use<'a, D> {
+    cell[D + 1..].chunks_exact(mesh.order.degree() - 1)
 }
 
 /// Return the point of the mesh that stands for the edge with these points inside: the middle of a quadratic one.

@@ -145,8 +145,7 @@ impl<const D: usize> MeshBuilder<D> {
     pub fn check_type(&mut self, kind: ElementType, groups: &[usize]) -> std::result::Result<(), Flaw> {
         let Some(&group) = groups.first() else { return Ok(()) };
         let name = &self.groups[group].name;
-        let highest = if D == 2 { Order::new(Order::HIGHEST) } else { Some(Order::P2) };
-        if kind.order > highest {
+        if kind.order > Some(Order::highest(D)) {
             let ElementType { shape, nodes, number, .. } = kind;
             let what = format!("group `{name}` has {} elements of {nodes} nodes (Gmsh's type {number})", shape.name);
             return Err(Flaw::new(what, ORDERS));
