@@ -382,8 +382,8 @@ fn rise<const D: usize>(side: &Side<D>, facet: usize, at: &[f64; D]) -> f64 {
 ///
 /// Near the edge of a contact surface the pressure of bodies without a layer is K r^(lambda - 1) at the distance r from the edge, with
 /// 1/2 <= lambda. The edge is no rim where the surface goes on as its mirror image: on an axis of revolution, and on a plane of symmetry.
-/// A facet lies at a rim if such an edge of side a bounds it. It does, too, if side b ends on it or on a facet beside it, at such an edge
-/// of b: the covered part of that facet may be a sliver.
+/// A facet lies at a rim if such an edge of side a bounds it. It does, too, if side b ends on it, where side a ends with a mirror image, or on a
+/// facet beside it, at such an edge of b: the covered part of that facet may be a sliver.
 ///
 /// The pressure may be singular where an interface of two materials ends in the contact, too, on the softer one as at a corner of the stiffer one.
 /// It jumps with the law of a layer, and no polynomial on a facet follows that.
@@ -402,13 +402,12 @@ fn facets_at_rim<const D: usize>(
         at_interface[point.facet_a] |=
             at_jump(0, a.facets.facet(point.facet_a)) || at_jump(1, b.facets.facet(point.facet_b));
     }
-    let ends_on = |i: usize| !cover[i].is_whole();
+    let is_partial = |i: usize| !cover[i].is_whole();
+    let is_last = |i: usize| a.facets.edges(i).into_iter().any(|edge| edges_a[&edge].len() == 1);
     let beside = |i: usize| a.facets.edges(i).into_iter().flat_map(|edge| &edges_a[&edge]).filter(move |&&k| k != i);
-    let ends_beside = |i: usize| beside(i).any(|&k| ends_on(k) && (above_rim_of_b[i] || above_rim_of_b[k]));
-    let at_rim = |i: usize| {
-        cover[i].share > 0.0
-            && (at_interface[i] || is_at_rim(a, &edges_a, i) || ends_on(i) && above_rim_of_b[i] || ends_beside(i))
-    };
+    let ends_beside = |i: usize| beside(i).any(|&k| is_partial(k) && (above_rim_of_b[i] || above_rim_of_b[k]));
+    let b_ends = |i: usize| (is_partial(i) || is_last(i)) && above_rim_of_b[i] || ends_beside(i);
+    let at_rim = |i: usize| cover[i].share > 0.0 && (at_interface[i] || is_at_rim(a, &edges_a, i) || b_ends(i));
     (0..a.facets.count()).map(at_rim).collect()
 }
 

@@ -6,11 +6,11 @@ use super::pieces::{Intersection, WHOLE};
 use super::side::{FaceNode, ROUNDING, Side, along};
 use crate::error::{Error, Result};
 use crate::fem::element::{self, Rule};
-use crate::fem::{area_vector, cross, length, pad};
+use crate::fem::{Frame, Space, area_vector, cross, length, pad};
 use crate::linalg::{Csr, dot};
 use crate::problem::order::Order;
 use serde::{Deserialize, Deserializer, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::rc::Rc;
 
 /// A discretised pair of surfaces: n contact points with one pressure each.
@@ -223,7 +223,7 @@ pub fn assemble<const D: usize>(
     for (index, side) in [a, b].into_iter().enumerate() {
         for (q, point) in points.iter().enumerate() {
             let shares = point.shares(index);
-            push_rows(&mut pair, index, side, of_nodes(side, &shares), nodes[q].direction);
+            push_rows(&mut pair, index, &side.dofs(), of_nodes(side, &shares), nodes[q].direction);
         }
     }
     Ok(pair)
@@ -284,12 +284,22 @@ fn of_nodes<const D: usize>(side: &Side<D>, shares: &[(u32, f64)]) -> BTreeMap<u
     sums
 }
 
+/// How the nodes of a body move with its dofs.
+#[derive(Debug, Clone, Copy)]
+pub struct NodeDofs<'a, const D: usize> {
+    pub space: &'a Space<D>,
+    /// Dofs of nodes with rotated axes and of tied nodes.
+    pub frame: &'a Frame<D>,
+    /// Values of the prescribed dofs.
+    pub prescribed: &'a HashMap<usize, f64>,
+}
+
 /// Append the rows of a contact point for one side of a pair. `index` is 0 for side a and 1 for side b, `shares` holds the
 /// shares of the side's nodes in the point, and `normal` points out of side a.
 fn push_rows<const D: usize>(
     pair: &mut ContactPair,
     index: usize,
-    side: &Side<D>,
+    side: &NodeDofs<D>,
     shares: impl IntoIterator<Item = (u32, f64)>,
     normal: [f64; D],
 ) {
@@ -377,6 +387,30 @@ impl ContactPair {
         let mut of = vec![None; count];
         self.on_side.iter().enumerate().for_each(|(q, &at)| of[at as usize] = Some(q));
         of
+    }
+
+    /// Return the shares of the nodes of a side in a point, which sum to one.
+    pub fn shares<const D: usize>(&self, side: usize, q: usize) -> Vec<(u32, f64)> {
+        let (normal, sign) = (&self.normal[q][..D], [1.0, -1.0][side]);
+        let entries: Vec<(usize, f64)> = self.nodal[side].row(q).collect();
+        let of_node = |of: &[(usize, f64)]| {
+            let along: f64 = of.iter().map(|(dof, entry)| entry * normal[dof % D]).sum();
+            ((of[0].0 / D) as u32, sign * along)
+        };
+        entries.chunk_by(|p, q| p.0 / D == q.0 / D).map(of_node).collect()
+    }
+
+    /// Replace the unit normals at all points, and with them the rows of both sides.
+    pub fn turn<const D: usize>(&mut self, normal: &[[f64; D]], sides: [NodeDofs<D>; 2]) {
+        for (index, side) in sides.into_iter().enumerate() {
+            let shares: Vec<Vec<(u32, f64)>> = (0..self.len()).map(|q| self.shares::<D>(index, q)).collect();
+            (self.rows[index], self.nodal[index]) = (Csr::new(side.space.dofs()), Csr::new(side.space.dofs()));
+            self.prescribed[index].clear();
+            self.resultant[index].clear();
+            self.moment[index].clear();
+            shares.into_iter().zip(normal).for_each(|(shares, n)| push_rows(self, index, &side, shares, *n));
+        }
+        self.normal = normal.iter().map(|&n| pad(n)).collect();
     }
 
     /// Return the number of facets of side a without a partner.

@@ -2,6 +2,7 @@
 
 use super::law::LawMaker;
 use super::mirror::Mirrors;
+use super::pair::NodeDofs;
 use crate::error::Result;
 use crate::fem::{Facets, Frame, Space, area_vector, element, length, minus, unit};
 use crate::linalg::{DisjointSets, axpy, bounds, dot};
@@ -152,6 +153,11 @@ impl<'a, const D: usize> Side<'a, D> {
                 *largest = largest.max(curvature);
             }
         }
+    }
+
+    /// Return how the nodes move with the dofs of the body.
+    pub fn dofs(&self) -> NodeDofs<'a, D> {
+        NodeDofs { space: self.space, frame: self.frame, prescribed: self.prescribed }
     }
 
     /// Return the indices in `nodes` of the nodes of facet `i`.

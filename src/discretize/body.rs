@@ -3,6 +3,7 @@
 
 use super::owned::OwnedDofs;
 use super::supports::Constraints;
+use crate::contact::NodeDofs;
 use crate::exchange::Plain;
 use crate::fem::interpolation::{coarse_nodes, from_vertices};
 use crate::fem::{NodalBlock, NodalForces, NodeGraph, PointExtent, Prolongation, RigidMotion, Space, rigid};
@@ -63,6 +64,11 @@ impl<const D: usize> BodyMesh<D> {
         self.graph.get_or_init(|| NodeGraph::with_rows(&self.space, &self.rows, &self.held.frame))
     }
 
+    /// Return how the nodes move with the dofs.
+    pub fn node_dofs(&self) -> NodeDofs<'_, D> {
+        NodeDofs { space: &self.space, frame: &self.held.frame, prescribed: &self.held.prescribed }
+    }
+
     /// Return the displacements of all dofs in a rigid motion.
     pub fn dofs_of(&self, motion: &RigidMotion<D>) -> Vec<f64> {
         self.held.frame.dofs(&motion.nodal(self.space.nodes.iter().copied()))
@@ -102,7 +108,7 @@ impl<const D: usize> BodyMesh<D> {
     }
 
     /// Return the displacement of a node in a rigid motion.
-    fn at(&self, motion: &RigidMotion<D>, node: u32) -> [f64; D] {
+    pub fn at(&self, motion: &RigidMotion<D>, node: u32) -> [f64; D] {
         motion.at(&self.space.nodes[node as usize])
     }
 

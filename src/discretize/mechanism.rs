@@ -14,7 +14,7 @@
 use super::whole::{NO_WORK, WholeBody};
 use crate::contact::ContactPair;
 use crate::error::{few, joined};
-use crate::fem::{PointExtent, RigidMotion, rigid};
+use crate::fem::{PointExtent, RigidMotion, length, minus, rigid, unit};
 use crate::linalg::{Blocks, DisjointSets, PART, TOLERANCE, axpy, dot, fit};
 use crate::model::Mechanism;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
@@ -23,9 +23,12 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 const LACKING: f64 = 1e-3;
 
 /// Find the motions that nothing resists. Fix those on which no load works. `lack` is the share that chords may take from the balance of loads.
-pub fn fix<const D: usize>(bodies: &mut [WholeBody<D>], pairs: &[ContactPair], lack: f64) -> Vec<Mechanism> {
+///
+/// Both sides of a pair slide along each other in such a motion: the normals of the pair are turned across it.
+pub fn fix<const D: usize>(bodies: &mut [WholeBody<D>], pairs: &mut [ContactPair], lack: f64) -> Vec<Mechanism> {
     let tilt = pairs.iter().map(|pair| pair.uncertainty).fold(0.0, f64::max);
-    let mut search = MechanismSearch { bodies, pairs, tilt, lack: lack.max(LACKING), found: Vec::new() };
+    let mut search =
+        MechanismSearch { bodies, pairs, tilt, lack: lack.max(LACKING), found: Vec::new(), fixed: Vec::new() };
     for group in search.groups() {
         search.settle(search.as_one(&group), |_| false);
     }
@@ -34,11 +37,13 @@ pub fn fix<const D: usize>(bodies: &mut [WholeBody<D>], pairs: &[ContactPair], l
         let least = search.tolerance();
         let is_resisted = |motion: &DVector<f64>| squares.closing.energy(motion) > least * motion.norm_squared();
         search.settle(search.kernel(&squares), is_resisted);
+        search.turn_normals();
     }
     search.found
 }
 
 /// A motion of some bodies, each of which is rigid.
+#[derive(Clone)]
 struct GroupMotion<const D: usize> {
     /// Indices of the bodies that it moves.
     bodies: Vec<usize>,
@@ -50,12 +55,14 @@ struct GroupMotion<const D: usize> {
 
 struct MechanismSearch<'p, 's, const D: usize> {
     bodies: &'p mut [WholeBody<'s, D>],
-    pairs: &'p [ContactPair],
+    pairs: &'p mut [ContactPair],
     /// Angle by which errors of coordinates turn normals.
     tilt: f64,
     /// Largest work of the loads on a motion, as a share of what forces of their sizes could do, that the mesh may be blamed for.
     lack: f64,
     found: Vec<Mechanism>,
+    /// The motions that contact does not resist and that are fixed.
+    fixed: Vec<GroupMotion<D>>,
 }
 
 impl<const D: usize> MechanismSearch<'_, '_, D> {
@@ -189,6 +196,67 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
         Squares { closing, leaning, error }
     }
 
+    /// Turn the normals of all pairs across the motions that are fixed, so that contact does not resist them to the last digit.
+    ///
+    /// Let V hold the relative displacements v_j of both sides at a point, averaged as its rows do. The new normal is the direction of
+    /// (I + V V' / s)^-1 n with s = [`TOLERANCE`]: the part of n along V vanishes. If two motions span all directions, as those of two discs
+    /// that turn for themselves nearly do, the direction is that of least displacement.
+    fn turn_normals(&mut self) {
+        if self.fixed.is_empty() {
+            return;
+        }
+        for number in 0..self.pairs.len() {
+            let pair = &self.pairs[number];
+            let motions: Vec<&GroupMotion<D>> = self.fixed.iter().filter(|moving| self.slides(moving, pair)).collect();
+            if motions.is_empty() {
+                continue;
+            }
+            let normal: Vec<[f64; D]> = (0..pair.len()).map(|q| self.across(&motions, pair, q)).collect();
+            // an obstacle has the rows of the surface before it until it is a rigid part
+            let [a, b] = pair.bodies;
+            let dofs =
+                [a, if b < self.bodies.len() { b } else { a }].map(|body| self.bodies[body].part.mesh.node_dofs());
+            self.pairs[number].turn(&normal, dofs);
+        }
+        for body in self.bodies.iter_mut() {
+            body.collect_rows(self.pairs);
+            body.find_motions();
+        }
+    }
+
+    /// Return whether the two sides of a pair slide along each other in a motion. Bodies that move as one do not.
+    fn slides(&self, moving: &GroupMotion<D>, pair: &ContactPair) -> bool {
+        let at = |body: usize, x: &[f64; 3]| {
+            let motion = moving.of(body).map(|motion| (motion, self.bodies[body].part.mesh.space.datum));
+            motion.map_or([0.0; D], |(motion, datum)| motion.at(&std::array::from_fn(|c| x[c] - datum[c])))
+        };
+        let [a, b] = pair.bodies;
+        a != b && pair.position.iter().any(|x| length(minus(at(a, x), at(b, x))) > PART * moving.amounts.norm())
+    }
+
+    /// Return the normal of a point of a pair, turned across motions.
+    fn across(&self, motions: &[&GroupMotion<D>], pair: &ContactPair, q: usize) -> [f64; D] {
+        let displacement = |moving: &&GroupMotion<D>| {
+            let mut v = DVector::<f64>::zeros(D);
+            for (side, (&body, sign)) in pair.bodies.iter().zip([1.0, -1.0]).enumerate() {
+                let Some(motion) = moving.of(body) else { continue };
+                for (node, share) in pair.shares::<D>(side, q) {
+                    let u = self.bodies[body].part.mesh.at(motion, node);
+                    v.axpy(sign * share, &DVector::from_row_slice(&u), 1.0);
+                }
+            }
+            v / moving.amounts.norm()
+        };
+        let all = DMatrix::from_columns(&motions.iter().map(displacement).collect::<Vec<_>>());
+        let svd = all.svd(true, false);
+        let normal = DVector::from_row_slice(&pair.normal[q][..D]);
+        let mut turned = normal.clone();
+        for (u, sigma) in svd.u.iter().flat_map(|u| u.column_iter()).zip(&svd.singular_values) {
+            turned.axpy(-u.dot(&normal) * sigma * sigma / (sigma * sigma + TOLERANCE), &u, 1.0);
+        }
+        unit(std::array::from_fn(|c| turned[c]))
+    }
+
     /// Return the displacements of the points of a pair by the motions of a body, one column each, times the root of the share of each point in the area.
     fn at_points(&self, body: usize, pair: &ContactPair) -> DMatrix<f64> {
         let (motions, datum) = (self.unconstrained(body), &self.bodies[body].part.mesh.space.datum);
@@ -252,6 +320,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
             let balanced = if most > self.tilt.max(NO_WORK) { most } else { 0.0 };
             let mut mechanism = Mechanism { balanced, ..mechanism(joined(names)) };
             for (_, moving) in set {
+                self.fixed.push(moving.clone());
                 mechanism.fixed = self.pin(moving, &mut pins).or(mechanism.fixed);
             }
             self.found.push(mechanism);

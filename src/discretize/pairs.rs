@@ -5,7 +5,6 @@ use super::auto::{self, SurfacePair};
 use super::bodies::SceneBody;
 use super::carrier;
 use super::groups::{Owners, find_group, point};
-use super::rigid;
 use super::surface::ContactSurface;
 use crate::contact::law::{self, OwnLaws};
 use crate::contact::pieces::{Cut, Intersection, Reach};
@@ -14,7 +13,6 @@ use crate::error::{Error, Located, Result};
 use crate::fem::{Facets, jumping, minus, unit};
 use crate::linalg::{bounds, dot};
 use crate::mesh::{Group, Mesh};
-use crate::model::BodySlot;
 use crate::problem::contact::{Carrier, ContactSpec, Overlap};
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
@@ -27,7 +25,7 @@ pub struct Contact<const D: usize> {
     /// Integration points, if they were requested.
     pub fine: Option<Fine<D>>,
     /// Whether its surfaces look away from each other, as the faces under head and nut of a bolt.
-    is_through: bool,
+    pub is_through: bool,
     pub facts: ContactFacts,
 }
 
@@ -109,8 +107,7 @@ fn between(spec: &ContactSpec, names: [String; 2]) -> ContactSpec {
     spec
 }
 
-/// Return all pairs of the scene: first the named ones in the order of the file, then those that are found; and the rigid parts, obstacles and
-/// offsets. `fine` requests integration points.
+/// Return all pairs of the scene: first the named ones in the order of the file, then those that are found. `fine` requests integration points.
 ///
 /// # Errors
 /// A surface is missing, bounds no body or several, or does not face its partner. A law or a gap has no value somewhere.
@@ -120,7 +117,7 @@ pub fn all<const D: usize>(
     cut: Cut<D>,
     parts: &[SceneBody<D>],
     fine: bool,
-) -> Result<(Vec<Contact<D>>, Vec<BodySlot>)> {
+) -> Result<Vec<Contact<D>>> {
     let points = parts.iter().zip(0..).filter(|_| scene.pairs().next().is_some());
     let owners =
         Owners::new(points.flat_map(|(part, body)| part.mesh.space.mesh_points().map(move |p| (p, body))).collect());
@@ -134,13 +131,9 @@ pub fn all<const D: usize>(
     for pair in found {
         contacts.extend(pair.orient(scene, parts).assemble(&scene.laws, parts, cut, fine)?);
     }
-    let mut rigid = Vec::new();
-    for (number, (contact, spec)) in contacts.iter_mut().zip(named()).enumerate() {
-        rigid.extend(rigid::part(&mut contact.pair, spec, contact.is_through, number, parts.len() + rigid.len())?);
-    }
     refuse_second_layers(scene, &contacts[..named().count()])?;
     auto::all_find_some(&rules, contacts.iter().map(|contact| contact.facts.table))?;
-    Ok((contacts, rigid))
+    Ok(contacts)
 }
 
 /// Refuse two layers between the same facets. A facet may face facets of several surfaces, each with a layer of its own.

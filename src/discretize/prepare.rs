@@ -10,7 +10,7 @@ use super::pairs::{self, ContactFacts};
 use super::partition::Partition;
 use super::verify::Verified;
 use super::whole::WholeBody;
-use super::{chords, mechanism};
+use super::{chords, mechanism, rigid};
 use crate::contact::pieces::Cut;
 use crate::contact::{self, ContactPair};
 use crate::error::Result;
@@ -90,15 +90,17 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     let mesh = &verified.mesh;
     let parts = parts(scene, verified)?;
     let (mut pairs, mut contacts, mut fine) = (Vec::new(), Vec::new(), Vec::new());
-    let (all, rigid) = pairs::all(scene, mesh, cut, &parts, keep)?;
-    for found in all {
+    let mut is_through = Vec::new();
+    for found in pairs::all(scene, mesh, cut, &parts, keep)? {
         pairs.push(found.pair);
+        is_through.push(found.is_through);
         contacts.push(found.facts);
         fine.extend(found.fine);
     }
     let lack = chords::lack(&parts, mesh)?;
     let mut bodies = WholeBody::all(parts, &pairs, mesh)?;
-    let mechanisms = mechanism::fix(&mut bodies, &pairs, lack);
+    let mechanisms = mechanism::fix(&mut bodies, &mut pairs, lack);
+    let rigid = rigid::all(scene, &mut pairs, &is_through, bodies.len())?;
     for body in &mut bodies {
         body.part.mesh.prescribed = body.part.mesh.prescribed_sorted();
     }

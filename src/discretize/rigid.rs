@@ -19,6 +19,7 @@ use crate::fem::cross;
 use crate::linalg::{Csr, dot, length};
 use crate::model::{BodySlot, Motion};
 use crate::problem::ContactSpec;
+use crate::scene::Scene;
 
 /// An obstacle before the surface of a pair, with the directions in which it moves.
 pub struct Obstacle<'a> {
@@ -139,12 +140,24 @@ impl<'a> Obstacle<'a> {
     }
 }
 
+/// Return the rigid parts of all pairs, obstacles and offsets, which follow the `bodies` in the model.
+///
+/// # Errors
+/// See [`part`].
+pub fn all(scene: &Scene, pairs: &mut [ContactPair], is_through: &[bool], bodies: usize) -> Result<Vec<BodySlot>> {
+    let mut found = Vec::new();
+    for (number, (pair, spec)) in pairs.iter_mut().zip(scene.pairs()).enumerate() {
+        found.extend(part(pair, spec, is_through[number], number, bodies + found.len())?);
+    }
+    Ok(found)
+}
+
 /// Return the rigid part of pair `number`, if its scene has one, as slot `index` of the model. `is_through` says whether its surfaces look away from each
 /// other: then pressures draw them together, and so does the preload of a bond.
 ///
 /// # Errors
 /// See [`Obstacle`]: a surface without a mean normal, and a moment about it.
-pub fn part(
+fn part(
     pair: &mut ContactPair,
     spec: &ContactSpec,
     is_through: bool,

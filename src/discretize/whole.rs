@@ -53,21 +53,26 @@ impl<'a, const D: usize> WholeBody<'a, D> {
     }
 
     fn new(mut part: SceneBody<'a, D>, segments: Vec<Segment>, pairs: &[ContactPair], mesh: &Mesh<D>) -> Result<Self> {
-        let rows = |of: fn(&ContactPair) -> &[Csr; 2]| {
-            let mut all = Csr::new(part.mesh.space.dofs());
-            for &Segment { pair, side } in &segments {
-                (0..pairs[pair].len()).for_each(|q| all.push_row(of(&pairs[pair])[side].row(q)));
-            }
-            all
-        };
-        (part.mesh.rows, part.mesh.nodal_rows) = (rows(|pair| &pair.rows), rows(|pair| &pair.nodal));
         part.mesh.approach = approach::rows(&part, &segments, pairs, mesh)?;
         part.mesh.load = part.load(mesh)?;
         let (rigid_modes, load) = (part.mesh.rigid_modes(), part.mesh.load_on_dofs());
         let mut body =
             Self { part, segments, rigid_modes, load, motions: Vec::new(), sprung: None, owner: 0, ranks: Vec::new() };
+        body.collect_rows(pairs);
         body.find_motions();
         Ok(body)
+    }
+
+    /// Collect the contact rows of the body.
+    pub fn collect_rows(&mut self, pairs: &[ContactPair]) {
+        let rows = |of: fn(&ContactPair) -> &[Csr; 2]| {
+            let mut all = Csr::new(self.part.mesh.space.dofs());
+            for &Segment { pair, side } in &self.segments {
+                (0..pairs[pair].len()).for_each(|q| all.push_row(of(&pairs[pair])[side].row(q)));
+            }
+            all
+        };
+        (self.part.mesh.rows, self.part.mesh.nodal_rows) = (rows(|pair| &pair.rows), rows(|pair| &pair.nodal));
     }
 
     /// Return the names of the motions that neither supports nor springs nor any contact row of the body resist.

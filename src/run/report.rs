@@ -46,17 +46,13 @@ pub fn report(session: &Session, done: &Done, recovered: &All, clock: &Clock) ->
     let balances = results::balances(done, recovered);
     let digits = report.error_bound.or(report.error_estimate).unwrap_or(f64::INFINITY);
     for (body, (info, balance)) in discrete.bodies.iter().zip(&balances).enumerate() {
-        let fixed = || discrete.mechanisms.iter().filter(|mechanism| mechanism.fixed == Some(body));
-        let error = if fixed().any(|mechanism| mechanism.by_facets) { digits.max(OF_FACETS) } else { digits };
-        report.warnings.extend(fixed().next().and_then(|_| warnings::of_fixed(&info.name, balance, error)));
+        if discrete.mechanisms.iter().any(|mechanism| mechanism.fixed == Some(body)) {
+            report.warnings.extend(warnings::of_fixed(&info.name, balance, digits));
+        }
     }
     report.bodies.iter_mut().zip(balances).for_each(|(body, balance)| body.balance = balance);
     report
 }
-
-/// Share of all forces on a body, fixed against a motion that facets resist, that its node may carry without a warning: the forces of facets along that motion.
-/// Loads may lack balance by as much.
-const OF_FACETS: f64 = 1e-3;
 
 /// Add the status and the results of the iteration.
 fn add_outcome(report: &mut Report, outcome: &Outcome, model: &Model) {

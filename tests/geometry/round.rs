@@ -158,7 +158,7 @@ fn a_ball_in_a_cup_keeps_its_forces() {
 [[contact]]\nbetween = \"auto\"\ndistance = 1\ntouching = true\nlayer = { linear = { stiffness = 1e3 } }\n";
     let run = solve(scene(BALL, text), &[]).converged();
     let imbalance = run.number("bodies/0/balance/force_imbalance");
-    assert!(imbalance < 1e-3, "{imbalance:e}\n{}", run.said());
+    assert!(imbalance < 1e-8, "{imbalance:e}\n{}", run.said());
     assert!(
         run.warnings().contains("nothing holds its rotation about x, y and z, and no load works on it"),
         "{}",
