@@ -1,6 +1,6 @@
 //! The finite element space of one body: its nodes and cells, numbered within the body, and displacements at points of cells.
 
-use super::element::{self, EDGES, Gradients, Rule, Slopes, Values};
+use super::element::{self, Gradients, Rule, Slopes, Values};
 use super::{cross, lagrange, minus, pad};
 use crate::exchange::Plain;
 use crate::linalg::dot;
@@ -50,7 +50,7 @@ impl<const D: usize> Space<D> {
     pub fn new(mesh: &Mesh<D>, group: &Group, order: Order) -> Self {
         let stride = element::node_count(D + 1, order);
         let cells = || group.connectivity.chunks_exact(group.stride);
-        let edges = || cells().filter(move |_| order > Order::P1).flat_map(|cell| inside_edges::<D>(mesh, cell));
+        let edges = || cells().filter(move |_| order > Order::P1).flat_map(|cell| mesh::edges(cell, D));
         let mut space = Space {
             order,
             nodes: Vec::new(),
@@ -60,11 +60,11 @@ impl<const D: usize> Space<D> {
             cells: Vec::with_capacity(group.connectivity.len() / group.stride * stride),
             axisymmetric: false,
             from_mesh: Numbering::new(cells().flat_map(|cell| &cell[..=D]).copied()),
-            edges: Numbering::new(edges().map(edge_point)),
+            edges: Numbering::new(edges().map(|(_, inside)| edge_point(inside))),
             measure: OnceCell::new(),
         };
-        let places = element::nodes::<3>(order).into_iter().skip(D + 1);
-        let weights: Vec<Vec<f64>> = places.map(|l| mesh::weights(mesh.order, &l)).collect();
+        let places = (D + 1..stride).map(|node| element::place(order, D + 1, node));
+        let weights: Vec<Vec<f64>> = places.map(|l| mesh::weights(mesh.order, &l[..=D])).collect();
         cells().for_each(|cell| space.add_cell(mesh, cell, &weights));
         space
     }
@@ -85,7 +85,7 @@ impl<const D: usize> Space<D> {
         let x: Vec<[f64; D]> = cell.iter().map(at).collect();
         let place = |local: usize| element::interpolate(&x, &weights[local - D - 1]);
         let count = self.order.degree() as u32 - 1;
-        for (inside, &(i, j)) in inside_edges::<D>(mesh, cell).zip(&EDGES) {
+        for ([i, j], inside) in mesh::edges(cell, D) {
             let is_forward = cell[i] < cell[j];
             let (first, is_new) = self.edges.number(edge_point(inside), self.nodes.len() as u32);
             if is_new {
@@ -129,14 +129,8 @@ impl<const D: usize> Space<D> {
 
     /// Return the space with other nodes and cells, which has no link to points of the mesh.
     pub fn with(&self, nodes: Vec<[f64; D]>, cells: Vec<u32>) -> Self {
-        Space {
-            nodes,
-            cells,
-            from_mesh: Numbering::default(),
-            edges: Numbering::default(),
-            measure: OnceCell::new(),
-            ..*self
-        }
+        let none = Numbering::default;
+        Space { nodes, cells, from_mesh: none(), edges: none(), measure: OnceCell::new(), ..*self }
     }
 
     /// Turn the space into the meridian of a body of revolution.
@@ -304,15 +298,11 @@ impl<const D: usize> Space<D> {
     /// Return the body's nodes of one simplex of a mesh group, or `None` if it is not part of this body: vertices, then those on edges, which are
     /// not sorted above order two. Nodes inside the simplex are left out.
     pub(super) fn simplex(&self, points: &[u32], dimension: usize) -> Option<Vec<u32>> {
-        let (vertices, count) = (dimension + 1, self.order.degree() as u32 - 1);
-        let mut nodes =
-            points[..vertices].iter().map(|&point| self.from_mesh.get(point)).collect::<Option<Vec<u32>>>()?;
-        if count > 0 && dimension > 0 {
-            let inside = 2 * (points.len() - vertices) / (dimension * vertices);
-            for edge in points[vertices..].chunks_exact(inside) {
-                let first = self.edges.get(edge_point(edge))?;
-                nodes.extend(first..first + count);
-            }
+        let vertices = points[..=dimension].iter().map(|&point| self.from_mesh.get(point));
+        let mut nodes = vertices.collect::<Option<Vec<u32>>>()?;
+        for (_, inside) in mesh::edges(points, dimension).filter(|_| self.order > Order::P1) {
+            let first = self.edges.get(edge_point(inside))?;
+            nodes.extend(first..first + self.order.degree() as u32 - 1);
         }
         Some(nodes)
     }
@@ -337,14 +327,6 @@ impl<const D: usize> Space<D> {
         nodes.dedup();
         nodes
     }
-}
-
-/// Return the points inside each edge of a cell of the mesh, which is not linear.
-fn inside_edges<'a, const D: usize>(
-    mesh: &Mesh<D>,
-    cell: &'a [u32],
-) -> impl Iterator<Item = &'a [u32]> + Clone + use<'a, D> {
-    cell[D + 1..].chunks_exact(mesh.order.degree() - 1)
 }
 
 /// Return the point of the mesh that stands for the edge with these points inside: the middle of a quadratic one.

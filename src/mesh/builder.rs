@@ -187,7 +187,7 @@ impl<const D: usize> MeshBuilder<D> {
                 own
             }
         };
-        let (dimension, stride) = (kind.shape.dimension, kind.stride());
+        let (dimension, stride) = (kind.shape.dimension, simplex::stride(kind.shape.dimension, kind.order));
         for simplex in simplices.chunks_exact_mut(stride) {
             if !simplex::turn(simplex, &self.points, dimension, D) {
                 let size = ["", "length", "area", "volume"][dimension];

@@ -37,7 +37,7 @@ pub use locality::bisect;
 pub use msh::parse;
 pub use script::unstructured;
 pub use script::view;
-pub use shape::weights;
+pub use shape::{edges, weights};
 pub use simplex::EDGES;
 
 use crate::linalg::{bounds, pad};

@@ -147,22 +147,15 @@ impl Contents {
         let mut contents = Self { nodes, ..Self::default() };
         for (tag, group) in (1..).zip(mesh.groups.iter()) {
             contents.groups.push((group.dimension, group.name.clone()));
-            let Some(kind) =
-                ElementType::of(ElementType::number([&POINT, &LINE, &TRIANGLE][group.dimension], group.stride))
-            else {
-                continue;
-            };
+            let kind = ElementType::number([&POINT, &LINE, &TRIANGLE][group.dimension], group.stride);
             for simplex in group.simplices() {
-                let mut nodes = simplex.to_vec();
-                // the third edge of a triangle is turned round, which turns it back
-                kind.reorder(&mut nodes);
                 let number = contents.elements.len() as u64 + 1;
-                contents.elements.push((
-                    number,
-                    kind.number,
-                    tag,
-                    nodes.into_iter().map(|node| u64::from(node) + 1).collect(),
-                ));
+                let mut nodes: Vec<u64> = simplex.iter().map(|&node| u64::from(node) + 1).collect();
+                if group.dimension == 2 {
+                    // Gmsh has the third edge as 20
+                    nodes[2 * mesh.order.degree() + 1..].reverse();
+                }
+                contents.elements.push((number, kind, tag, nodes));
             }
         }
         contents

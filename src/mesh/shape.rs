@@ -14,6 +14,19 @@ use super::simplex::EDGES;
 use crate::linalg::interpolation_weights;
 use crate::problem::order::Order;
 
+/// Return the edges of a simplex, given by its points or a property of each: the local numbers of the ends, and the
+/// points inside. Linear simplices have none.
+pub fn edges<T>(simplex: &[T], dimension: usize) -> impl Iterator<Item = ([usize; 2], &[T])> + Clone {
+    let inside = (simplex.len() - dimension - 1).checked_div(dimension * (dimension + 1) / 2).unwrap_or(0);
+    EDGES.into_iter().zip(simplex[dimension + 1..].chunks_exact(inside.max(1)))
+}
+
+/// Return the place of point `k` of so many inside a straight edge.
+pub fn on_chord<const N: usize>([a, b]: [[f64; N]; 2], k: usize, inside: usize) -> [f64; N] {
+    let s = (k + 1) as f64 / (inside + 1) as f64;
+    std::array::from_fn(|c| (1.0 - s) * a[c] + s * b[c])
+}
+
 /// Return the weight of each point of a simplex of an order, vertices before those of the edges, in the point with
 /// barycentric coordinates `l`.
 pub fn weights(order: Order, l: &[f64]) -> Vec<f64> {

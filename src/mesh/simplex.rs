@@ -127,15 +127,15 @@ impl ElementType {
         !self.shape.faces.is_empty()
     }
 
-    /// Return the number of points of a simplex of this dimension and order in a [`Mesh`](super::Mesh).
-    pub fn stride(&self) -> usize {
-        stride(self.shape.dimension, self.order)
+    /// Return the number of nodes inside each edge.
+    pub fn inside(&self) -> usize {
+        self.order.map_or(0, |order| order.degree() - 1)
     }
 
     /// Reorder the nodes of a simplex from Gmsh's order to ours, without those inside a triangle. Gmsh has the third
     /// edge of a triangle as 20, and mid-edge 23 before 13 in the quadratic tetrahedron.
     pub fn reorder(&self, simplex: &mut Vec<u32>) {
-        simplex.truncate(self.stride());
+        simplex.truncate(stride(self.shape.dimension, self.order));
         match (self.shape.dimension, self.order) {
             (2, Some(order)) => simplex[2 * order.degree() + 1..].reverse(),
             (3, Some(Order::P2)) => simplex.swap(8, 9),

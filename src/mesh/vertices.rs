@@ -3,9 +3,8 @@
 //! Elements of high order converge fast where the solution is smooth. At an end of the contact, and where a gap has a kink, it is smooth on both sides, but
 //! not in a cell that holds the place. A mesher knows only sizes, so that its mesh is changed afterwards.
 
-use super::Mesh;
-use super::simplex::EDGES;
-use crate::linalg::{axpy, dot, interpolation_weights, length, minus};
+use super::{Mesh, edges};
+use crate::linalg::{axpy, dot, interpolation_weights, length, minus, unit};
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// Least ratio of the area of a cell after a move to that before it. A vertex that moves by half of an edge along a boundary
@@ -60,7 +59,7 @@ impl Mesh<2> {
             for simplex in group.simplices() {
                 match group.dimension {
                     0 => fixed.extend(simplex),
-                    1 => groups_of.entry(row(simplex, simplex[0] < simplex[1])).or_default().push(index),
+                    1 => groups_of.entry(row(simplex, simplex[0].min(simplex[1]))).or_default().push(index),
                     // a vertex of two bodies or materials belongs to their interface
                     _ => fixed.extend(simplex.iter().filter(|&&point| *body_of.entry(point).or_insert(index) != index)),
                 }
@@ -72,13 +71,16 @@ impl Mesh<2> {
         }
         let passage = |(&vertex, edges): (&u32, &Vec<&Vec<u32>>)| {
             let &[first, second] = &edges[..] else { return None };
-            let (first, second) = if first < second { (first, second) } else { (second, first) };
-            let away = |edge: &[u32]| -> Vec<u32> {
-                if edge[0] == vertex { edge.to_vec() } else { edge.iter().rev().copied().collect() }
-            };
             let is_free = groups_of[first] == groups_of[second] && !fixed.contains(&vertex);
-            let before = away(first).into_iter().rev();
-            is_free.then(|| before.chain(away(second).into_iter().skip(1)).collect::<Passage>())
+            let [mut points, mut after] = [first.min(second), first.max(second)].map(|edge| (*edge).clone());
+            if points[0] == vertex {
+                points.reverse();
+            }
+            if after[0] != vertex {
+                after.reverse();
+            }
+            points.extend(&after[1..]);
+            is_free.then_some(points)
         };
         let mut passages: Vec<Passage> =
             edges_at.iter().filter_map(passage).filter(|passage| is_smooth(&self.places(passage))).collect();
@@ -98,10 +100,10 @@ impl Mesh<2> {
     /// spaced along this chord.
     fn moved_passage(&self, passage: &Passage, place: [f64; 2]) -> Option<Vec<[f64; 2]>> {
         let (points, degree) = (self.places(passage), self.order.degree());
-        let (first, last) = (points[0], points[2 * degree]);
-        let whole = length(minus(last, first));
-        let along = minus(last, first).map(|x| x / whole);
+        let first = points[0];
+        let along = unit(minus(points[2 * degree], first));
         let at: Vec<f64> = points.iter().map(|&x| dot(&minus(x, first), &along)).collect();
+        let whole = at[2 * degree];
         if !at.is_sorted_by(|a, b| a < b) {
             return None;
         }
@@ -122,16 +124,10 @@ impl Mesh<2> {
                 return None;
             }
         }
-        if length(minus(place, curve(s))) >= 0.5 * whole {
-            return None;
-        }
         let share = |k: usize| k as f64 / degree as f64;
-        let mut moved: Vec<[f64; 2]> = (0..2 * degree)
-            .map(|k| if k < degree { share(k) * s } else { s + share(k - degree) * (whole - s) })
-            .map(curve)
-            .collect();
-        moved.push(last);
-        Some(moved)
+        let along_chord = |k: usize| if k < degree { share(k) * s } else { s + share(k - degree) * (whole - s) };
+        (length(minus(place, curve(s))) < 0.5 * whole)
+            .then(|| (0..=2 * degree).map(|k| curve(along_chord(k))).collect())
     }
 
     /// Give the points of a passage new places, and the other edges at its vertex straight shifts. Return false, and change nothing, if a cell at the vertex
@@ -153,12 +149,11 @@ impl Mesh<2> {
         }
         let mut inner: BTreeMap<u32, f64> = BTreeMap::new();
         for cell in cells {
-            for (ends, inside) in EDGES.iter().zip(cell[3..].chunks_exact(degree - 1)) {
-                for (k, &point) in (1..).zip(inside).filter(|(_, point)| !passage.contains(point)) {
-                    let share = k as f64 / degree as f64;
-                    let shares = ends.iter().zip([1.0 - share, share]);
-                    inner.extend(shares.filter(|(end, _)| cell[**end] == vertex).map(|(_, share)| (point, share)));
-                }
+            for (ends, inside) in edges(cell, 2) {
+                let Some(end) = ends.iter().position(|&end| cell[end] == vertex) else { continue };
+                let share = |k: usize| if end == 1 { k } else { degree - k } as f64 / degree as f64;
+                let points = (1..).zip(inside).filter(|(_, point)| !passage.contains(point));
+                inner.extend(points.map(|(k, &point)| (point, share(k))));
             }
         }
         for (point, share) in inner {
@@ -169,13 +164,10 @@ impl Mesh<2> {
     }
 }
 
-/// Return the points of an edge in a row, from its first or its second end.
-fn row(edge: &[u32], is_forward: bool) -> Vec<u32> {
-    let mut row = [&edge[..1], &edge[2..], &edge[1..2]].concat();
-    if !is_forward {
-        row.reverse();
-    }
-    row
+/// Return the points of an edge in a row from one of its ends.
+fn row(edge: &[u32], from: u32) -> Vec<u32> {
+    let row = [&edge[..1], &edge[2..], &edge[1..2]].concat();
+    if edge[0] == from { row } else { row.into_iter().rev().collect() }
 }
 
 /// Return whether the two edges through points in a row have one tangent in the middle, where they meet.

@@ -64,22 +64,17 @@ impl<const D: usize> Facet<D> {
     /// Return the point of the facet with barycentric coordinates `l`. An edge of an order above two goes on along its
     /// tangents beyond its ends, where its polynomial would amplify rounding.
     pub fn at(&self, l: &[f64; D]) -> [f64; D] {
-        let (on_facet, beyond) = self.nearest(l);
+        let on_facet = self.nearest(l);
         let mut x = element::interpolate(&self.x, &element::values(self.order, &on_facet));
-        if beyond != 0.0 {
-            axpy(beyond, &element::tangent(self.order, &self.x, &on_facet, 0), &mut x);
+        if on_facet[1] != l[1] {
+            axpy(l[1] - on_facet[1], &self.tangent(0, l), &mut x);
         }
         x
     }
 
-    /// Return the coordinates of the nearest point on an edge of an order above two, and what remains of the second
-    /// one. Other facets go on as polynomials.
-    fn nearest(&self, l: &[f64; D]) -> ([f64; D], f64) {
-        if self.order <= Order::P2 || (0.0..=1.0).contains(&l[1]) {
-            return (*l, 0.0);
-        }
-        let s = l[1].clamp(0.0, 1.0);
-        (std::array::from_fn(|k| if k == 0 { 1.0 - s } else { s }), l[1] - s)
+    /// Return the coordinates of the nearest point on an edge of an order above two. Other facets go on as polynomials.
+    fn nearest(&self, l: &[f64; D]) -> [f64; D] {
+        if self.order <= Order::P2 { *l } else { l.map(|l| l.clamp(0.0, 1.0)) }
     }
 
     pub fn normal(&self, l: &[f64; D]) -> [f64; D] {
@@ -89,20 +84,14 @@ impl<const D: usize> Facet<D> {
     /// Return a bound of the sum of the sizes of the terms that [`Facet::at`] adds.
     fn terms(&self, l: &[f64; D]) -> f64 {
         let reach = 1.0 + 2.0 * l[1..].iter().map(|l| l.abs()).sum::<f64>();
-        self.size
-            * match self.order {
-                Order::P1 => reach,
-                // the quadratic functions, l (2l - 1) and 4 l m for barycentric coordinates l and m, sum to less than 3
-                // reach^2 in size
-                Order::P2 => 3.0 * reach * reach,
-                // those of higher orders sum to less than 2.3 on the facet, and their tangents are near its size
-                _ => 2.3 * reach,
-            }
+        // The quadratic functions, l (2l - 1) and 4 l m for barycentric coordinates l and m, sum to less than 3 reach^2 in size, those of higher
+        // orders to less than 2.3 on their edge, along which tangents are near its size.
+        self.size * if self.order == Order::P1 { reach } else { 3.0 * reach * reach }
     }
 
     /// Return the derivative of x by the barycentric coordinate l[k + 1]. When that coordinate grows, l[0] becomes smaller by as much.
     pub fn tangent(&self, k: usize, l: &[f64; D]) -> [f64; D] {
-        element::tangent(self.order, &self.x, &self.nearest(l).0, k)
+        element::tangent(self.order, &self.x, &self.nearest(l), k)
     }
 
     /// Return where the line x + t n meets the surface, as barycentric coordinates and t, at most `beside` outside of the facet; `None` if it

@@ -115,13 +115,8 @@ pub fn check<const D: usize>(faces: &Faces<D>, cells: &Cells<D>) -> Result<()> {
         }
         if cells.is_curved() {
             let [mut first, mut second] = [a, b].map(|face| face.nodes(simplices).skip(D).collect::<Vec<_>>());
-            if D == 2 {
-                // the other cell sees the edge from its other side
-                second.reverse();
-            } else {
-                first.sort_unstable();
-                second.sort_unstable();
-            }
+            first.sort_unstable();
+            second.sort_unstable();
             if first != second {
                 let what = "two cells have different mid-edge nodes on the facet that they share";
                 return Err(refuse(what));
