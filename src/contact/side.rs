@@ -42,7 +42,7 @@ pub struct FaceNode<const D: usize> {
     pub direction: [f64; D],
     /// Length of the sum of the own normal and that of the other side before it, zero if they are opposite.
     pub tilt: f64,
-    /// Curvature (1/length): the largest difference of two nodal normals over their distance, on the facets around.
+    /// Curvature (1/length): the largest difference of the normals at two vertices over their distance, on the facets around.
     pub curvature: f64,
     /// Mean of (n_f - n)(n_f - n)' over the unit normals n_f of the facets around, where n is `normal`; of both sides, where `direction` is.
     pub spread: Spread<D>,
@@ -135,13 +135,13 @@ impl<'a, const D: usize> Side<'a, D> {
         }
     }
 
-    /// Compute the curvature of the surface at each node.
+    /// Compute the curvature of the surface at each node, from normals at vertices: those of nearer nodes differ by little more than rounding.
     fn bend(&mut self) {
         let flat = self.tilt().max(ROUNDING);
         for i in 0..self.facets.count() {
             let (x, on) = (self.facets.coordinates(i, self.space), self.on_facet(i).to_vec());
             let mut curvature: f64 = 0.0;
-            for k in 0..on.len() {
+            for k in 0..D {
                 for l in 0..k {
                     let [p, q] = [on[k], on[l]].map(|corner| self.nodes[corner as usize].normal);
                     let turn = length(minus(p, q));
