@@ -7,6 +7,7 @@ use crate::error::Result;
 use crate::fem::{Facets, Frame, Space, area_vector, element, length, minus, unit};
 use crate::linalg::{DisjointSets, axpy, bounds, dot};
 use crate::mesh::datum;
+use crate::problem::order::Order;
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// One contact surface of a body.
@@ -42,7 +43,7 @@ pub struct FaceNode<const D: usize> {
     pub direction: [f64; D],
     /// Length of the sum of the own normal and that of the other side before it, zero if they are opposite.
     pub tilt: f64,
-    /// Curvature (1/length): the largest difference of the normals at two vertices over their distance, on the facets around.
+    /// Curvature (1/length): the largest difference of two nodal normals over their distance, on the facets around.
     pub curvature: f64,
     /// Mean of (n_f - n)(n_f - n)' over the unit normals n_f of the facets around, where n is `normal`; of both sides, where `direction` is.
     pub spread: Spread<D>,
@@ -135,24 +136,33 @@ impl<'a, const D: usize> Side<'a, D> {
         }
     }
 
-    /// Compute the curvature of the surface at each node, from normals at vertices: those of nearer nodes differ by little more than rounding.
+    /// Compute the curvature of the surface at each node.
     fn bend(&mut self) {
         let flat = self.tilt().max(ROUNDING);
         for i in 0..self.facets.count() {
-            let (x, on) = (self.facets.coordinates(i, self.space), self.on_facet(i).to_vec());
-            let mut curvature: f64 = 0.0;
-            for k in 0..D {
-                for l in 0..k {
-                    let [p, q] = [on[k], on[l]].map(|corner| self.nodes[corner as usize].normal);
-                    let turn = length(minus(p, q));
-                    curvature = curvature.max(if turn > flat { turn / length(minus(x[k], x[l])) } else { 0.0 });
-                }
-            }
+            let (turns, on) = (self.turns(i), self.on_facet(i).to_vec());
+            let bent = turns.into_iter().filter(|(turn, _)| *turn > flat);
+            let curvature = bent.map(|(turn, over)| turn / over).fold(0.0, f64::max);
             for corner in on {
                 let largest = &mut self.nodes[corner as usize].curvature;
                 *largest = largest.max(curvature);
             }
         }
+    }
+
+    /// Return by how much the normal of facet `i` turns, and over which lengths: between its nodes, or on an edge of an order above two by the height
+    /// above its chord, which has more digits than the tangents.
+    fn turns(&self, i: usize) -> Vec<(f64, f64)> {
+        let (x, on) = (self.facets.coordinates(i, self.space), self.on_facet(i));
+        if self.facets.order > Order::P2 {
+            let [from, to, middle] = [x[0], x[1], self.facets.point(i, self.space, &[0.5; D])];
+            let height = length::<D>(std::array::from_fn(|c| middle[c] - 0.5 * (from[c] + to[c])));
+            let chord = length(minus(to, from));
+            return vec![(8.0 * height / chord, chord)];
+        }
+        let normal = |k: usize| self.nodes[on[k] as usize].normal;
+        let pairs = (0..on.len()).flat_map(|k| (0..k).map(move |l| (k, l)));
+        pairs.map(|(k, l)| (length(minus(normal(k), normal(l))), length(minus(x[k], x[l])))).collect()
     }
 
     /// Return how the nodes move with the dofs of the body.
