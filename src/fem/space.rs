@@ -200,19 +200,15 @@ impl<const D: usize> Space<D> {
         self.from_mesh.points().chain(self.edges.points())
     }
 
-    /// Return the point of a mesh of some order that each node is, or [`Space::NO_POINT`].
+    /// Return the point of a mesh of some order that each node is, or `u32::MAX` for those on maps of its cells.
     pub fn points_of_nodes(&self, mesh: Order) -> Vec<u32> {
-        let mut points = vec![Self::NO_POINT; self.nodes.len()];
+        let mut points = vec![u32::MAX; self.nodes.len()];
         let middles = (self.order.max(mesh) == Order::P2).then_some(&self.edges);
         for numbering in [&self.from_mesh].into_iter().chain(middles) {
             numbering.points().for_each(|at| numbering.get(at).into_iter().for_each(|node| points[node as usize] = at));
         }
         points
     }
-
-    /// What stands for the point of the mesh of a node that is none: one within an edge or a cell of order three or more. It is the number of no point,
-    /// since a mesh has at most as many points as there are numbers below it.
-    pub const NO_POINT: u32 = u32::MAX;
 
     /// Return the contribution of a cell to the measure of the body, from its corners. In a body of revolution it is the volume of a
     /// ring.

@@ -1,6 +1,6 @@
 //! The groups of a mesh by name, and compact numberings of their points.
 
-use super::shape::{edges, on_chord};
+use super::shape::{edges, on_chord, turned};
 use super::simplex::EDGES;
 use crate::problem::body::plain;
 use crate::problem::order::Order;
@@ -173,11 +173,6 @@ pub fn raise<const N: usize>(groups: &mut [Group], points: &mut Vec<[f64; N]>, o
         }
         (group.stride, group.connectivity) = (group.stride + edges.len() * inside, connectivity);
     }
-}
-
-fn turned(nodes: &[u32], is_turned: bool) -> SmallVec<[u32; 2]> {
-    let count = nodes.len();
-    (0..count).map(|k| nodes[if is_turned { count - 1 - k } else { k }]).collect()
 }
 
 /// The entry of a point that is not a node.

@@ -13,12 +13,19 @@
 use super::simplex::EDGES;
 use crate::linalg::interpolation_weights;
 use crate::problem::order::Order;
+use smallvec::SmallVec;
 
 /// Return the edges of a simplex, given by its points or a property of each: the local numbers of the ends, and the
 /// points inside. Linear simplices have none.
 pub fn edges<T>(simplex: &[T], dimension: usize) -> impl Iterator<Item = ([usize; 2], &[T])> + Clone {
     let inside = (simplex.len() - dimension - 1).checked_div(dimension * (dimension + 1) / 2).unwrap_or(0);
     EDGES.into_iter().zip(simplex[dimension + 1..].chunks_exact(inside.max(1)))
+}
+
+/// Return points in their order, or turned round.
+pub fn turned(points: &[u32], is_turned: bool) -> SmallVec<[u32; 2]> {
+    let count = points.len();
+    (0..count).map(|k| points[if is_turned { count - 1 - k } else { k }]).collect()
 }
 
 /// Return the place of point `k` of so many inside a straight edge.
@@ -54,14 +61,10 @@ mod tests {
     fn maps_follow_their_edges() {
         for order in (1..=Order::HIGHEST).filter_map(Order::new) {
             let degree = order.degree();
-            let share = |k: usize| k as f64 / degree as f64;
             let mut places = vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-            for [i, j] in &EDGES[..3] {
-                places.extend((1..degree).map(|k| {
-                    let mut l = [0.0; 3];
-                    (l[*i], l[*j]) = (1.0 - share(k), share(k));
-                    l
-                }));
+            for edge in &EDGES[..3] {
+                let ends = edge.map(|end| places[end]);
+                places.extend((1..degree).map(|k| on_chord(ends, k - 1, degree - 1)));
             }
             for (own, l) in places.iter().enumerate() {
                 for (point, weight) in weights(order, l).into_iter().enumerate() {

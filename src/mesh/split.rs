@@ -9,7 +9,9 @@
 //! of the cell takes the centre of the reference cube. The boundary of the simplices is thus interpolated from that of
 //! the cells.
 
+use super::shape::turned;
 use super::simplex::{EDGES, ElementType, QUADRANGLE, Shape};
+use smallvec::SmallVec;
 use std::collections::HashMap;
 
 /// Return the quadrangular faces of a shape. A quadrangle has one, itself.
@@ -75,7 +77,7 @@ impl Middles<'_> {
     ///
     /// Edges come first, since a diagonal of a face is an edge of the cell where another edge of the face was drawn into a
     /// point. For the same reason faces come before the cell.
-    fn inside(&mut self, kind: ElementType, cell: &[u32], ends: [u32; 2]) -> Vec<u32> {
+    fn inside(&mut self, kind: ElementType, cell: &[u32], ends: [u32; 2]) -> SmallVec<[u32; 2]> {
         let (shape, count) = (kind.shape, kind.inside() as u32);
         if let Some(nodes) = on_edge(kind, cell, ends) {
             return nodes;
@@ -99,23 +101,16 @@ impl Middles<'_> {
             first
         });
         self.known.insert(key, first);
-        turned((first..first + count).collect(), ends[0] > ends[1])
+        turned(&(first..first + count).collect::<Vec<_>>(), ends[0] > ends[1])
     }
-}
-
-fn turned(mut nodes: Vec<u32>, is_turned: bool) -> Vec<u32> {
-    if is_turned {
-        nodes.reverse();
-    }
-    nodes
 }
 
 /// Return the nodes inside an edge of a cell from its first to its second end, if the ends belong to an edge.
-fn on_edge(kind: ElementType, cell: &[u32], ends: [u32; 2]) -> Option<Vec<u32>> {
+fn on_edge(kind: ElementType, cell: &[u32], ends: [u32; 2]) -> Option<SmallVec<[u32; 2]>> {
     let of_edge = |[a, b]: [usize; 2]| [cell[a], cell[b]];
     let is_edge = |edge: &[usize; 2]| [ends, [ends[1], ends[0]]].contains(&of_edge(*edge));
     let (edge, count) = (kind.shape.edges.iter().position(is_edge)?, kind.inside());
-    let nodes = cell[kind.shape.corners + edge * count..][..count].to_vec();
+    let nodes = &cell[kind.shape.corners + edge * count..][..count];
     Some(turned(nodes, of_edge(kind.shape.edges[edge]) != ends))
 }
 

@@ -4,7 +4,7 @@ mod mutations;
 
 use super::cache::Cache;
 use super::load::{Meshing, load};
-use super::{Asked, Duty, Group, Loaded, Mesh, MeshOrigin, MeshProducer, msh, simplex, view};
+use super::{Asked, Duty, Group, Loaded, Mesh, MeshOrigin, MeshProducer, msh, shape, simplex, view};
 use crate::error::{Located, Place, Result, Source};
 use crate::interrupt::Interrupt;
 use crate::problem::mesh::{AdaptedMesh, MeshSource};
@@ -107,17 +107,14 @@ fn assert_sizes<const D: usize>(mesh: &Mesh<D>, sizes: &[(&str, f64)]) {
         let size = extent(mesh, mesh.group(name).unwrap());
         assert!((size - expected).abs() < 1e-9, "{name}: {size}");
     }
-    let inside = mesh.order.degree() - 1;
-    for group in mesh.groups.iter().filter(|group| group.dimension > 0 && inside > 0) {
+    let at = |point: u32| mesh.points[point as usize];
+    for group in mesh.groups.iter().filter(|group| group.dimension > 0) {
         for simplex in group.simplices() {
             assert_eq!(simplex.len(), simplex::stride(group.dimension, Some(mesh.order)));
-            let edges = simplex[group.dimension + 1..].chunks_exact(inside);
-            for (points, [a, b]) in edges.zip(simplex::EDGES) {
-                for (number, point) in (1..).zip(points) {
-                    let [x, y, m] = [simplex[a], simplex[b], *point].map(|point| mesh.points[point as usize]);
-                    let s = f64::from(number) / (inside + 1) as f64;
-                    let is_in_place = |k: usize| (m[k] - (1.0 - s) * x[k] - s * y[k]).abs() < 1e-9;
-                    assert!((0..D).all(is_in_place), "{point} of `{}`", group.name);
+            for (ends, inside) in shape::edges(simplex, group.dimension) {
+                for (k, &point) in inside.iter().enumerate() {
+                    let straight = shape::on_chord(ends.map(|end| at(simplex[end])), k, inside.len());
+                    assert!((0..D).all(|c| (at(point)[c] - straight[c]).abs() < 1e-9), "{point} of `{}`", group.name);
                 }
             }
         }

@@ -3,6 +3,7 @@
 //! Elements of high order converge fast where the solution is smooth. At an end of the contact, and where a gap has a kink, it is smooth on both sides, but
 //! not in a cell that holds the place. A mesher knows only sizes, so that its mesh is changed afterwards.
 
+use super::shape::turned;
 use super::{Mesh, edges};
 use crate::linalg::{axpy, dot, interpolation_weights, length, minus, unit};
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -52,14 +53,13 @@ impl Mesh<2> {
 
     /// Return the passages of all vertices that may move along a boundary, in the order of their numbers.
     fn passages(&self) -> Vec<Passage> {
-        // each edge as its vertices, the smaller number first, and the points from there
         let mut groups_of: HashMap<Vec<u32>, Vec<usize>> = HashMap::new();
         let (mut fixed, mut body_of) = (HashSet::<u32>::new(), HashMap::new());
         for (index, group) in self.groups.iter().enumerate() {
             for simplex in group.simplices() {
                 match group.dimension {
                     0 => fixed.extend(simplex),
-                    1 => groups_of.entry(row(simplex, simplex[0].min(simplex[1]))).or_default().push(index),
+                    1 => groups_of.entry(row(simplex)).or_default().push(index),
                     // a vertex of two bodies or materials belongs to their interface
                     _ => fixed.extend(simplex.iter().filter(|&&point| *body_of.entry(point).or_insert(index) != index)),
                 }
@@ -72,15 +72,9 @@ impl Mesh<2> {
         let passage = |(&vertex, edges): (&u32, &Vec<&Vec<u32>>)| {
             let &[first, second] = &edges[..] else { return None };
             let is_free = groups_of[first] == groups_of[second] && !fixed.contains(&vertex);
-            let [mut points, mut after] = [first.min(second), first.max(second)].map(|edge| (*edge).clone());
-            if points[0] == vertex {
-                points.reverse();
-            }
-            if after[0] != vertex {
-                after.reverse();
-            }
-            points.extend(&after[1..]);
-            is_free.then_some(points)
+            let [before, after] = [first.min(second), first.max(second)];
+            let after = turned(after, after[0] != vertex).into_iter().skip(1);
+            is_free.then(|| turned(before, before[0] == vertex).into_iter().chain(after).collect::<Passage>())
         };
         let mut passages: Vec<Passage> =
             edges_at.iter().filter_map(passage).filter(|passage| is_smooth(&self.places(passage))).collect();
@@ -164,10 +158,9 @@ impl Mesh<2> {
     }
 }
 
-/// Return the points of an edge in a row from one of its ends.
-fn row(edge: &[u32], from: u32) -> Vec<u32> {
-    let row = [&edge[..1], &edge[2..], &edge[1..2]].concat();
-    if edge[0] == from { row } else { row.into_iter().rev().collect() }
+/// Return the points of an edge in a row from the end with the smaller number.
+fn row(edge: &[u32]) -> Vec<u32> {
+    turned(&[&edge[..1], &edge[2..], &edge[1..2]].concat(), edge[0] > edge[1]).into_vec()
 }
 
 /// Return whether the two edges through points in a row have one tangent in the middle, where they meet.

@@ -6,7 +6,7 @@
 
 use super::faces::Cells;
 use crate::error::Result;
-use crate::linalg::{axpy, cross, dot, length, minus, pad};
+use crate::linalg::{cross, dot, length, minus, pad};
 use crate::mesh::Mesh;
 use crate::mesh::shape;
 use crate::problem::order::Order;
@@ -92,10 +92,9 @@ type Powers = [usize; 4];
 
 /// Return the powers in each function of the basis of a degree on a simplex of a dimension.
 fn powers(degree: usize, dimension: usize) -> Vec<Powers> {
-    let up_to = move |most: usize| 0..=most;
-    let all = up_to(degree).flat_map(|i| up_to(degree - i).map(move |j| [i, j]));
-    let all = all.flat_map(|[i, j]| up_to(if dimension == 2 { 0 } else { degree - i - j }).map(move |k| [i, j, k]));
-    all.map(|[i, j, k]| [degree - i - j - k, i, j, k]).collect()
+    let height = if dimension == 2 { 0 } else { degree };
+    let all = (0..=degree).flat_map(|i| (0..=degree - i).map(move |j| (i, j, degree - i - j)));
+    all.flat_map(|(i, j, rest)| (0..=rest.min(height)).map(move |k| [rest - k, i, j, k])).collect()
 }
 
 /// Return the multinomial coefficient of powers.
@@ -121,7 +120,6 @@ impl Bernstein {
             let raised = |a: usize| std::array::from_fn(|i| p[i] + usize::from(i == a));
             (0..=dimension).map(|a| number(&own, raised(a))).collect()
         };
-        let in_space = if dimension == 2 { 1 } else { lower.len() };
         let product = |at: usize| {
             let all = [at % lower.len(), at / lower.len() % lower.len(), at / lower.len() / lower.len()];
             let factors = || all[..dimension].iter().map(|&p| &lower[p]);
@@ -131,7 +129,7 @@ impl Bernstein {
         Self {
             control: Self::control(order, &own, dimension),
             raised: lower.iter().map(raised).collect(),
-            products: (0..lower.len().pow(2) * in_space).map(product).collect(),
+            products: (0..lower.len().pow(dimension as u32)).map(product).collect(),
         }
     }
 
@@ -151,15 +149,10 @@ impl Bernstein {
 
     /// Return the coefficients of the Jacobian of a simplex with these points.
     fn jacobian(&self, x: &[[f64; 3]]) -> Vec<f64> {
-        let point = |row: usize| {
-            (x.iter().enumerate()).fold([0.0; 3], |mut sum, (k, x)| {
-                axpy(self.control[(row, k)], x, &mut sum);
-                sum
-            })
-        };
-        let b: Vec<[f64; 3]> = (0..self.control.nrows()).map(point).collect();
+        let b = &self.control * DMatrix::from_fn(x.len(), 3, |k, c| x[k][c]);
+        let edge = |from: usize, to: usize| [0, 1, 2].map(|c| b[(to, c)] - b[(from, c)]);
         // the third column is the normal of the plane
-        let along = |p: &Vec<usize>, a: usize| p.get(a).map_or([0.0, 0.0, 1.0], |&at| minus(b[at], b[p[0]]));
+        let along = |p: &Vec<usize>, a: usize| p.get(a).map_or([0.0, 0.0, 1.0], |&to| edge(p[0], to));
         let slopes: Vec<[[f64; 3]; 3]> = self.raised.iter().map(|p| [1, 2, 3].map(|a| along(p, a))).collect();
         let mut coefficients = vec![0.0; self.products.iter().map(|product| product.1 + 1).max().unwrap_or(0)];
         for ([p, q, r], at, weight) in &self.products {
