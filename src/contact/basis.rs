@@ -17,11 +17,11 @@ pub enum Carriers {
     Vertices,
     /// The mid-edges of a quadratic triangle.
     MidEdges,
-    /// Nodes of an edge of order three or more, moved to the covered part of it.
+    /// Nodes of an edge of order three or more, or of order two on an axis of revolution, moved to the covered part of it.
     Part(Part),
 }
 
-/// The covered part of an edge of order three or more, with points at its Gauss-Lobatto points.
+/// The covered part of an edge, with points at its Gauss-Lobatto points.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Part {
     /// Its ends, of 0 to 1 along the edge.
@@ -84,7 +84,7 @@ fn opposite(edge: usize) -> usize {
 pub(super) enum PressureBasis {
     /// The dual basis mu = C phi of the covered part, with one function for each node and the shape functions phi.
     Dual(DMatrix<f64>),
-    /// The same on an edge of order three or more with the shape functions of the covered part. The function of a node on the axis of revolution is zero.
+    /// The same on an edge with the shape functions of the covered part. The function of a node on the axis of revolution is zero.
     Part(DMatrix<f64>, Part),
     /// Hat functions: the barycentric coordinate mu_i = l_i at vertex i, zero at mid-edges.
     Hats,
@@ -109,7 +109,7 @@ impl PressureBasis {
     /// Choose the basis on facet `chunk[0].facet_a`, a simplex of `order` with `count` nodes. `chunk` holds the integration
     /// points of the part that the facets `b` of side b cover, and `axis` is the local node on the axis of revolution.
     ///
-    /// On an edge of order three or more this node carries no point. On a straight edge int r phi is zero there, and on a curved edge it has either sign: it
+    /// On an edge of order two or more this node carries no point. On a straight edge int r phi is zero there, and on a curved edge it has either sign: it
     /// is distributed over the other nodes, so that their weights integrate polynomials of one degree less than the elements as before.
     ///
     /// Where these facets are apart, the distance jumps, and a dual mean would be beyond the distances on both sides of the jump: an overlap
@@ -127,7 +127,8 @@ impl PressureBasis {
         if order == Order::P2 && D == 3 {
             return Self::MidEdges.or_hats(order, &(D..2 * D).collect::<Vec<_>>(), chunk);
         }
-        let mut part = (D == 2 && order > Order::P2).then(|| Part::covered(chunk));
+        let of_parts = order > Order::P2 || order == Order::P2 && axis.is_some();
+        let mut part = (D == 2 && of_parts).then(|| Part::covered(chunk));
         if part.is_some_and(|part| part.ends[1] - part.ends[0] <= ROUNDING) {
             return Self::Hats;
         }

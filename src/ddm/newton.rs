@@ -17,7 +17,7 @@ use super::forcing::{Forcing, resisting};
 use super::run::{Outcome, Row, Run};
 use super::start::SEARCH;
 use super::step::{Equilibrium, Progress, StepLength};
-use super::stop::{Stagnation, Status, falls};
+use super::stop::{Stagnation, Status, falls, roundoff};
 use crate::error::Result;
 use crate::exchange::{self, ASKS, asks};
 use crate::model::Model;
@@ -227,7 +227,7 @@ impl Newton<'_, '_> {
         self.return_to(begin);
         let least = self.descents;
         for step in 1..=self.run.stop.iterations {
-            let length = self.descent_step()?;
+            let length = self.descent_step(roundoff(f1))?;
             self.descents += 1;
             let is_whole = (length - 1.0).abs() <= WHOLE_STEP && step >= least;
             if length == 0.0 || is_whole || self.is_asked() {
@@ -254,8 +254,8 @@ impl Newton<'_, '_> {
     }
 
     /// Take one step of Newton's method for F1 from the states at the compressions of the iterate. Return its length; zero if its linear system
-    /// is not solved, or F1 falls without end.
-    fn descent_step(&mut self) -> Result<f64> {
+    /// is not solved, if F1 falls without end, or if the whole step promises a fall of less than `unseen`.
+    fn descent_step(&mut self, unseen: f64) -> Result<f64> {
         let model = &mut *self.run.model;
         let layer = Layer::at(model, &self.u.trace);
         let springs = resisting(model, &layer);
@@ -271,6 +271,9 @@ impl Newton<'_, '_> {
             enough: &mut enough,
         };
         let Ok(step) = self.linear.solve(system)? else { return Ok(0.0) };
+        if 0.5 * step.energy <= unseen {
+            return Ok(0.0);
+        }
         let products = self.linear.multiply(model, &step.field.displacements);
         let Ok(length) = LineEnergy::new(model, &layer, &residual, &step.field, &products).minimize(SEARCH) else {
             return Ok(0.0);

@@ -83,7 +83,12 @@ const SEEN: f64 = 1e-12;
 
 /// Return whether F1 is less than it was `before` by more than roundoff.
 pub(super) fn falls(before: f64, now: f64) -> bool {
-    before - now > SEEN * now.abs()
+    before - now > roundoff(now)
+}
+
+/// Return the roundoff of a value of F1.
+pub(super) fn roundoff(f1: f64) -> f64 {
+    SEEN * f1.abs()
 }
 
 /// A watch for stagnation of Newton's method.
@@ -110,7 +115,7 @@ impl Default for Stagnation {
 
 impl Stagnation {
     /// Note a step: the error and F1 after it, the squared distance from the laws after it over that before it (`fall`), and whether the laws were smoothed, so
-    /// that the error falls with mu. Return whether the run stagnates.
+    /// that far from the solution the error falls with mu. Return whether the run stagnates.
     pub fn note(&mut self, error: f64, energy: f64, fall: f64, is_smoothed: bool) -> bool {
         let is_far = error.powi(2) > EXACT;
         let share = if is_far { FALLS } else { NEAR_FALLS };
@@ -120,7 +125,7 @@ impl Stagnation {
         }
         let is_lower = falls(self.least, energy);
         self.least = self.least.min(energy);
-        let is_progress = is_better || is_smoothed || is_lower || is_far && fall < FALLS;
+        let is_progress = is_better || is_lower || is_far && (is_smoothed || fall < FALLS);
         self.since = if is_progress { 0 } else { self.since + 1 };
         self.since >= PATIENCE
     }

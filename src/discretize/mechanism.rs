@@ -156,9 +156,10 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
             let works = self.bodies.iter().flat_map(|body| body.motions.iter().map(|motion| motion.work));
             let loads = DVector::from_vec(works.collect());
             let yielding = held.solve(&loads);
-            free.extend(found.unwrap_or(doubtful).into_iter().map(|motion| {
+            let found = squares.rounded(found.unwrap_or(doubtful));
+            free.extend(found.into_iter().map(|motion| {
                 let is_exact = closing.energy(&motion) <= self.tolerance() * motion.norm_squared();
-                if is_exact { motion } else { squares.plain(motion, &loads, &yielding) }
+                if is_exact { motion } else { squares.unloaded(motion, &loads, &yielding) }
             }));
         }
         free
@@ -208,7 +209,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
         for number in 0..self.pairs.len() {
             let pair = &self.pairs[number];
             let motions: Vec<&GroupMotion<D>> = self.fixed.iter().filter(|moving| self.slides(moving, pair)).collect();
-            if motions.is_empty() {
+            if motions.is_empty() || pair.spread.is_empty() {
                 continue;
             }
             let normal: Vec<[f64; D]> = (0..pair.len()).map(|q| self.across(&motions, pair, q)).collect();
@@ -346,7 +347,30 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
             }
             spans.push((rigid::sum(&whole, &DVector::from_vec(amounts)), moving.amounts.clone()));
         }
-        rigid::apart(spans).into_iter().map(|(motion, amounts)| (motion.in_words(), self.moving(amounts))).collect()
+        let bodies = &set[0].bodies;
+        let spans = rigid::apart(spans);
+        let shifts = rigid::to_common_point(&spans.iter().map(|(motion, _)| motion).collect::<Vec<_>>());
+        let shifted = |((motion, amounts), shift): ((RigidMotion<D>, DVector<f64>), [f64; D])| {
+            let parts = (0..D).filter(|&c| shift[c] != 0.0).map(|c| shift[c] * self.as_group(bodies, &whole[c]));
+            (motion, parts.fold(amounts, |sum, part| sum + part))
+        };
+        spans
+            .into_iter()
+            .zip(shifts)
+            .map(shifted)
+            .map(|(motion, amounts)| (motion.in_words(), self.moving(amounts)))
+            .collect()
+    }
+
+    /// Return the amounts of one motion of several bodies, as near as the motions that supports leave come to it.
+    fn as_group(&self, bodies: &[usize], motion: &RigidMotion<D>) -> DVector<f64> {
+        let mut amounts = DVector::zeros(self.count());
+        for &body in bodies {
+            let left: Vec<Vec<f64>> = self.unconstrained(body).iter().map(|own| self.at_corners(body, own)).collect();
+            let own = fit(&left, &self.at_corners(body, motion));
+            amounts.as_mut_slice()[self.first(body)..][..own.len()].copy_from_slice(&own);
+        }
+        amounts
     }
 
     /// Return the name of a motion of several bodies, each of which has its own.
@@ -446,19 +470,26 @@ struct Squares {
 }
 
 impl Squares {
-    /// Return the plainest motion that differs from a motion by no more than its error: without small parts, and such that loads do no work on it.
-    /// `yielding` are the motions by which contact yields to the loads.
-    fn plain(&self, motion: DVector<f64>, loads: &DVector<f64>, yielding: &DVector<f64>) -> DVector<f64> {
-        let most = self.closing.energy(&motion) + self.error.energy(&motion);
-        let is_near = |other: &DVector<f64>| self.closing.energy(other) <= most;
-        let least = SLIGHT * motion.amax();
-        let mut found = motion;
-        let rounded = found.map(|part| if part.abs() < least { 0.0 } else { part });
-        if is_near(&rounded) {
-            found = rounded;
-        }
-        let unloaded = &found - loads.dot(&found) / loads.dot(yielding) * yielding;
-        if is_near(&unloaded) { unloaded } else { found }
+    /// Return whether a motion differs from another by no more than the error of that one.
+    fn is_near(&self, motion: &DVector<f64>, other: &DVector<f64>) -> bool {
+        self.closing.energy(motion) <= self.closing.energy(other) + self.error.energy(other)
+    }
+
+    /// Return motions without their small parts, if these may be errors in all of them.
+    fn rounded(&self, motions: Vec<DVector<f64>>) -> Vec<DVector<f64>> {
+        let round = |motion: &DVector<f64>| {
+            let least = SLIGHT * motion.amax();
+            motion.map(|part| if part.abs() < least { 0.0 } else { part })
+        };
+        let rounded: Vec<DVector<f64>> = motions.iter().map(round).collect();
+        let all_near = rounded.iter().zip(&motions).all(|(rounded, motion)| self.is_near(rounded, motion));
+        if all_near { rounded } else { motions }
+    }
+
+    /// Return a motion without the part on which loads work, if that may be an error. `yielding` are the motions by which contact yields to the loads.
+    fn unloaded(&self, motion: DVector<f64>, loads: &DVector<f64>, yielding: &DVector<f64>) -> DVector<f64> {
+        let unloaded = &motion - loads.dot(&motion) / loads.dot(yielding) * yielding;
+        if self.is_near(&unloaded, &motion) { unloaded } else { motion }
     }
 }
 

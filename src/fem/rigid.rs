@@ -105,6 +105,21 @@ pub fn apart<const D: usize>(span: Vec<(RigidMotion<D>, DVector<f64>)>) -> Vec<(
     span
 }
 
+/// Return translations that turn rotations about all axes, as [`apart`] returns them, into rotations about one point; zeros unless all three are there.
+///
+/// If the rotation about axis k comes with the translation T_kc along axis c, the symmetric part of T is what no common point explains.
+pub fn to_common_point<const D: usize>(motions: &[&RigidMotion<D>]) -> Vec<[f64; D]> {
+    let mut shifts = vec![[0.0; D]; motions.len()];
+    if D == 3 && motions.len() == 3 && motions.iter().all(|motion| motion.kind().0 == TURN) {
+        for k in 0..3 {
+            for c in 0..D {
+                shifts[k][c] = -0.5 * (motions[k].weights[c] + motions[c].weights[k]);
+            }
+        }
+    }
+    shifts
+}
+
 /// The rigid motions of a free body at its dofs.
 #[derive(Clone, Copy)]
 pub struct AtDofs<'a> {

@@ -172,6 +172,11 @@ impl<'a> SolverFactory<'a> {
             Linear::Direct => {
                 let is_iterative = |preset: &Preset| matches!(preset, Preset::Gamg | Preset::Icc);
                 let preset = self.asked.preset.filter(is_iterative).unwrap_or(Preset::Mumps);
+                if preset == Preset::Icc && is_parallel {
+                    // each rank factors its own rows
+                    let of_blocks = [("pc_type", "bjacobi"), ("sub_pc_type", "icc"), ("sub_pc_factor_levels", "1")];
+                    of_blocks.iter().for_each(|(name, value)| self.asked.whole.set_default(name, value));
+                }
                 preset::apply(&mut self.asked.whole, preset, None);
             }
             Linear::Multigrid => {

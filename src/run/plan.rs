@@ -1,7 +1,7 @@
 //! The plan of a run's linear algebra: from facts of the bodies and from what is asked for to the inner solvers.
 //!
-//! Newton's method joins the bodies in one matrix if all are condensed, factored, or solved by multigrid. They then need no solver of their own.
-//! Otherwise every body has one, and sweeps solve the linear steps. The first rank makes the plan, and the other ranks follow it.
+//! Newton's method joins the bodies in one matrix, or in one Schur complement if all are condensed. They then need no solver of their own.
+//! If options are typed for one body, or the method asks for it, every body has one, and sweeps solve the linear steps. The first rank makes the plan, and the other ranks follow it.
 
 use crate::parallel::owners;
 use crate::problem::{Linear, MethodName, Preset};
@@ -188,12 +188,8 @@ fn linear_step(asked: &SolverRequest, bodies: &mut [BodyPlan]) -> Linear {
         Some("hypre") => Linear::Multigrid,
         Some("mg") if is_quadratic => Linear::Multigrid,
         Some("cholesky" | "lu") => Linear::Direct,
-        Some(_) if is_auto && !whole.has_own() => Linear::Sweeps,
         None if all(Preset::Condensed) && !whole.asks_for_ksp() && fits_dense => Linear::Dense,
         None if all(Preset::Hypre) => Linear::Multigrid,
-        None if is_auto && bodies.iter().any(|body| matches!(body.preset, Preset::Gamg | Preset::Icc)) => {
-            Linear::Sweeps
-        }
         _ => Linear::Direct,
     }
 }
@@ -335,7 +331,7 @@ mod tests {
         let preset =
             |preset: Preset, method: MethodName| of(&cubes, &SolverRequest { preset: Some(preset), ..asked(method) });
         assert_eq!(preset(Mumps, MethodName::Auto), (Linear::Direct, vec![Mumps; 2]));
-        assert_eq!(preset(Icc, MethodName::Auto), (Linear::Sweeps, vec![Icc; 2]));
+        assert_eq!(preset(Icc, MethodName::Auto), (Linear::Direct, vec![Icc; 2]));
         assert_eq!(preset(Icc, MethodName::Newton), (Linear::Direct, vec![Icc; 2]));
         assert_eq!(preset(Hypre, MethodName::Robin), (Linear::Sweeps, vec![Hypre; 2]));
         // options for one body apply to that body alone
@@ -350,7 +346,7 @@ mod tests {
         };
         assert_eq!(
             ["hypre", "cholesky", "jacobi", "mg"].map(|pc| of_pc(pc, false)),
-            [Linear::Multigrid, Linear::Direct, Linear::Sweeps, Linear::Sweeps]
+            [Linear::Multigrid, Linear::Direct, Linear::Direct, Linear::Direct]
         );
         assert_eq!(of_pc("jacobi", true), Linear::Direct);
     }

@@ -291,15 +291,15 @@ fn shells_in_contact() {
     }
 }
 
-/// The same pressure with a few curved edges of high order. On the edge at the axis int r phi of the node there is not zero, and hat functions, with two
+/// The same pressure with a few curved edges. On the edge at the axis int r phi of the node there is not zero, and hat functions, with two
 /// points on that edge, have pressures that are 5e-3 off.
 #[test]
 fn few_curved_edges_at_the_axis() {
-    for degree in [3, 4] {
+    for (degree, most) in [(2, 0.1), (3, 1e-3), (4, 1e-3)] {
         let orders = [0, 1].map(|body| format!("body.{body}.order={degree}"));
         let table = solved(case("shells"), &[&orders[0], &orders[1], "mesh.set={ni=4, no=4}"]).contact();
         let off = table["pressure"].iter().map(|p| (p / 8.485_601_823_078_518 - 1.0).abs()).fold(0.0, f64::max);
-        assert!(off < 1e-3 && table.rows() == 4 * degree, "P{degree}: {off:e}, {} points", table.rows());
+        assert!(off < most && table.rows() == 4 * degree, "P{degree}: {off:e}, {} points", table.rows());
     }
 }
 

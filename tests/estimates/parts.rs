@@ -137,3 +137,38 @@ fn pressures_of_a_few_facets_are_a_guess() {
     assert!(coarse.contains("is a guess: contact ends within the facets"), "{coarse}");
     assert!(!fine.contains("guess"), "{fine}");
 }
+
+/// Two flush blocks. The lower one goes on beyond its sides as its mirror image, and the upper one ends there.
+const FLUSH: &str = "DefineConstant[ n = {8, Name \"n\"} ];\n\
+    For k In {0 : 1}\n i = 10*k;\n\
+    Point(i + 1) = {0, k, 0}; Point(i + 2) = {2, k, 0}; Point(i + 3) = {2, k + 1, 0}; Point(i + 4) = {0, k + 1, 0};\n\
+    For j In {1 : 4}\n Line(i + j) = {i + j, i + j % 4 + 1};\nEndFor\n\
+    Curve Loop(i + 1) = {i + 1 : i + 4}; Plane Surface(i + 1) = {i + 1};\n\
+    Transfinite Curve{i + 1, i + 3} = n + 1; Transfinite Curve{i + 2, i + 4} = n/2 + 1; Transfinite Surface{i + 1};\nEndFor\n\
+    Physical Surface(\"lower\") = {1}; Physical Surface(\"upper\") = {11}; Physical Curve(\"base\") = {1};\n\
+    Physical Curve(\"sides\") = {2, 4}; Physical Curve(\"seat\") = {3}; Physical Curve(\"foot\") = {11};\n\
+    Physical Curve(\"top\") = {13}; Physical Curve(\"left\") = {14};\n";
+
+/// The pressure rises where the upper surface alone ends, at all orders.
+#[test]
+fn pressures_at_the_end_of_one_surface() {
+    let scene = Scene::new(
+        "dimension = 2\nestimate = true\nmesh = { geo = \"flush.geo\" }\n\
+         [[body]]\nname = \"lower\"\nyoung = 1e3\npoisson = 0.3\nfix = [{ on = \"base\", y = 0 }, { on = \"sides\", x = 0 }]\n\
+         [[body]]\nname = \"upper\"\nyoung = 2e3\npoisson = 0.3\nload = [{ on = \"top\", pressure = \"1 + 0.2*x\" }]\n\
+         spring = [{ on = \"left\", stiffness = [1, 0] }]\n\
+         [[contact]]\nbetween = [\"seat\", \"foot\"]\nlayer = { linear = { stiffness = 1e4 } }\n",
+    );
+    std::fs::write(scene.path.with_file_name("flush.geo"), FLUSH).expect("a script");
+    let with = |order: usize, n: usize| {
+        let orders = [0, 1].map(|body| format!("body.{body}.order={order}"));
+        solve_here(&scene, &[&format!("mesh.set.n={n}"), &orders[0], &orders[1]]).converged()
+    };
+    let fine = with(2, 64).contact();
+    for (order, n) in [(1, 8), (1, 16), (2, 8), (3, 8)] {
+        let run = with(order, n);
+        let exact = difference(&run.contact(), &fine, &["pressure"]);
+        let estimated = run.number("discretization_error/pressure/0");
+        assert!((0.8..3.0).contains(&(estimated / exact)), "order {order}, n {n}: {estimated} {exact}");
+    }
+}

@@ -290,3 +290,31 @@ fn forces_balance_on_adapted_meshes() {
         }
     }
 }
+
+/// A tolerance that roundoff does not allow ends the run after a few more steps, though a descent makes many of them.
+#[test]
+fn a_tolerance_below_roundoff_ends_soon() {
+    let text = r#"dimension = 2
+mesh = { geo = "meshes/groove/groove.geo", set = { n = 12 } }
+[[body]]
+name = "lower"
+young = 1.097571e4
+poisson = -0.3
+order = 1
+fix = [{ on = "lower_axis", x = 0 }, { on = "lower_face", y = 0 }]
+[[body]]
+name = "upper"
+young = 8.962066e3
+poisson = -0.3
+order = 2
+fix = [{ on = "upper_axis", x = 0 }]
+load = [{ on = "upper_face", pressure = 3.104423e0 }]
+[[contact]]
+between = ["lower_top", "upper_bottom"]
+gap = "1.182696e-4*sin(1.380326e1*x) + 7.629726e-5*x^2"
+layer = { table = [[1.769337e-5, 1e-6], [1.199203e-2, 2.5e0], [1.199286e-2, 5e0], [1.011992e0, 5.000000001868e0]] }
+"#;
+    let text = text.replace("meshes/", concat!(env!("CARGO_MANIFEST_DIR"), "/meshes/"));
+    let run = solve(Scene::new(text), &["--set", "method.stop.residual=1e-14", "--set", "method.stop.iterations=3000"]);
+    assert!(run.number("iterations") < 100.0 && run.number("error_bound") < 1e-9, "{}", run.said());
+}

@@ -1,4 +1,4 @@
-//! The plots of a benchmark: time against error, and time and memory against the degrees of freedom.
+//! The plots of a benchmark: time against error, and time, memory and inner iterations against the degrees of freedom.
 
 use super::plan::{Benchmark, Measured, is_of_mesh};
 use crate::commands::rows::Row;
@@ -16,6 +16,7 @@ pub(super) fn plots(rows: &[Measured], bench: &Benchmark) -> Vec<(String, Plot)>
             chart.time_error(),
             chart.against_dofs(|row| chart.time(row), chart.time_label()),
             chart.against_dofs(|row| row.memory_mb, "peak memory, MB"),
+            chart.against_dofs(iterations, "inner iterations"),
         ];
         let files = KINDS.map(|what| file(what, name, bench));
         plots.extend(files.into_iter().zip(list).filter_map(|(file, plot)| Some((file, plot?))));
@@ -24,7 +25,12 @@ pub(super) fn plots(rows: &[Measured], bench: &Benchmark) -> Vec<(String, Plot)>
 }
 
 /// What is drawn for each scene.
-const KINDS: [&str; 3] = ["time-error", "time-dofs", "memory-dofs"];
+const KINDS: [&str; 4] = ["time-error", "time-dofs", "memory-dofs", "iterations-dofs"];
+
+/// Return the inner iterations of a run; none if its solvers are direct.
+fn iterations(row: &Row) -> Option<f64> {
+    row.inner_iterations.filter(|count| *count > 0).map(|count| count as f64)
+}
 
 /// Return the names of the files of all plots.
 pub(super) fn names(bench: &Benchmark) -> impl Iterator<Item = String> {
