@@ -156,8 +156,8 @@ impl<'a, const D: usize> Side<'a, D> {
         let (x, on) = (self.facets.coordinates(i, self.space), self.on_facet(i));
         if self.facets.order > Order::P2 {
             let [from, to, middle] = [x[0], x[1], self.facets.point(i, self.space, &[0.5; D])];
-            let height = length::<D>(std::array::from_fn(|c| middle[c] - 0.5 * (from[c] + to[c])));
-            let chord = length(minus(to, from));
+            let (chord, along, off) = (length(minus(to, from)), unit(minus(to, from)), minus(middle, from));
+            let height = length::<D>(std::array::from_fn(|c| off[c] - dot(&off, &along) * along[c]));
             return vec![(8.0 * height / chord, chord)];
         }
         let normal = |k: usize| self.nodes[on[k] as usize].normal;
