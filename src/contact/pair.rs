@@ -201,7 +201,7 @@ pub fn assemble<const D: usize>(
         area: points.iter().zip(&nodes).map(across).collect(),
         normal: nodes.iter().map(|at| pad(at.direction)).collect(),
         tilt: nodes.iter().map(|at| at.tilt).collect(),
-        spread: spreads(&nodes),
+        spread: spreads(&nodes, a.tilt().max(b.tilt()).max(ROUNDING)),
         gap: gaps(a, &points, &position, gap)?,
         nodes: nodes.iter().map(|at| at.node).collect(),
         face: faces(a, &on_side, &points, &position),
@@ -229,10 +229,10 @@ pub fn assemble<const D: usize>(
     Ok(pair)
 }
 
-/// Return the spread of the normals around each contact point, nothing if none exceeds the rounding of normals.
-fn spreads<const D: usize>(nodes: &[&FaceNode<D>]) -> Vec<[[f64; 3]; 3]> {
+/// Return the spread of the normals around each contact point, nothing if none exceeds the `rounding` of normals.
+fn spreads<const D: usize>(nodes: &[&FaceNode<D>], rounding: f64) -> Vec<[[f64; 3]; 3]> {
     let of = |at: &&FaceNode<D>| std::array::from_fn(|c| if c < D { pad(at.spread[c]) } else { [0.0; 3] });
-    let leans = |at: &&FaceNode<D>| (0..D).any(|c| at.spread[c][c] > ROUNDING * ROUNDING);
+    let leans = |at: &&FaceNode<D>| (0..D).any(|c| at.spread[c][c] > rounding * rounding);
     if nodes.iter().any(leans) { nodes.iter().map(of).collect() } else { Vec::new() }
 }
 

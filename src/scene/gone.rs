@@ -1,8 +1,8 @@
-//! Keys and values of scenes, commands and options that earlier versions knew, each with what to use instead.
+//! Keys and values of scenes, commands and options that earlier versions or other programs know, each with what to use instead.
 
 use crate::error::Error;
 
-/// Names that are gone, a key or a word that was the value of a key: the name, what its place in the scene is called, and the advice.
+/// Names that are gone, or stand for what is not computed: a key or a word that was the value of a key: the name, what its place in the scene is called, and the advice.
 const KEYS: &[(&str, &str, &str)] = &[
     ("anderson", "method", SWEEPS),
     ("asperities", "layer", "scripts/library/asperities.py prints their law: layer = { table = [...] }"),
@@ -14,16 +14,28 @@ const KEYS: &[(&str, &str, &str)] = &[
         "output",
         "VTU files are written as they are: `precision = \"single\"` halves them, `tar czf` compresses a folder",
     ),
+    ("density", "body", "give a weight as force = [0, 0, -DENSITY*GRAVITY], a force a unit of volume"),
     ("depth", "method", "the method `anderson`, which had it, is gone"),
+    ("expansion", "body", HEAT),
     ("fill", "data", HEIGHTS),
+    (
+        "friction",
+        "contact",
+        "contact is without friction: surfaces slide freely, and a bond carries normal forces alone",
+    ),
     ("memory", "mesh", "Gmsh has `timeout` alone; the shell limits memory: ulimit -v"),
     ("missing", "data", HEIGHTS),
     ("ncg", "method", SWEEPS),
     ("nested", "method", "start = \"auto\" takes about as many steps"),
     ("options", "solver", "PETSc options follow the scene on the command line, or stand in a file: -options_file FILE"),
     ("parabola", "data", HEIGHTS),
+    ("plastic", "body", "bodies are linearly elastic"),
     ("points", "data", HEIGHTS),
+    ("shear", "contact", "a layer carries normal forces alone"),
     ("spectral", "method", "gamma = \"aitken\" or \"line-search\""),
+    ("temperature", "body", HEAT),
+    ("thermal_expansion", "body", HEAT),
+    ("yield", "body", "bodies are linearly elastic: compare the largest von Mises stress with the yield stress"),
 ];
 
 /// Options with their dashes, and commands that are gone.
@@ -47,6 +59,9 @@ pub const OPTIONS: &[(&str, &str)] = &[
     ),
     ("report", "`winkler solve --report` writes the page of a run"),
 ];
+
+/// Advice for heat.
+const HEAT: &str = "heat is not computed: a uniform change of temperature between bodies may be given as a `gap`";
 
 /// Advice for methods over the sweep.
 const SWEEPS: &str = "name = \"auto\", or \"robin\" with gamma = \"aitken\"";

@@ -323,6 +323,8 @@ const CASES: &[Case] = &[
     ("geo = \"groove.geo\"", "geo = \".\"", "\".\"", " is not a file", ""),
     ("n = 32 }", "n = 32 }, timeout = 0", "0", "the timeout is 0", ""),
     ("n = 32 }", "n = 32 }, threads = 0", "0", "`threads` is 0", ""),
+    ("[method]", "friction = 0.2\n[method]", "friction", "unknown key `friction` in [[contact]]", "without friction"),
+    ("poisson = 0.3", "poisson = 0.3\nthermal_expansion = 1e-5", "thermal_expansion", "unknown key `thermal_expansion` in [[body]]", "heat is not computed"),
     ("[method]", "points = 3\n[method]", "points", "unknown key `points` in [[contact]]", "its keys are"),
     ("n = 32 }", "n = 32 }, memory = 8", "memory", "unknown key `memory`", "`timeout` alone"),
     ("geo = \"groove.geo\", set = { n = 32 }", "msh = \"groove.msh\", timeout = 1", "1", "`timeout` for a finished mesh", ""),

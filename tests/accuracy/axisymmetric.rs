@@ -295,11 +295,11 @@ fn shells_in_contact() {
 /// points on that edge, have pressures that are 5e-3 off.
 #[test]
 fn few_curved_edges_at_the_axis() {
-    for (degree, most) in [(2, 0.1), (3, 1e-3), (4, 1e-3)] {
+    for (degree, most, points) in [(2, 1e-2, 8), (3, 1e-3, 12), (4, 1e-3, 16)] {
         let orders = [0, 1].map(|body| format!("body.{body}.order={degree}"));
         let table = solved(case("shells"), &[&orders[0], &orders[1], "mesh.set={ni=4, no=4}"]).contact();
         let off = table["pressure"].iter().map(|p| (p / 8.485_601_823_078_518 - 1.0).abs()).fold(0.0, f64::max);
-        assert!(off < most && table.rows() == 4 * degree, "P{degree}: {off:e}, {} points", table.rows());
+        assert!(off < most && table.rows() == points, "P{degree}: {off:e}, {} points", table.rows());
     }
 }
 
