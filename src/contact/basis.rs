@@ -17,7 +17,7 @@ pub enum Carriers {
     Vertices,
     /// The mid-edges of a quadratic triangle.
     MidEdges,
-    /// Nodes of an edge of order three or more, moved to the covered part of it.
+    /// Nodes of an edge of order three or more, or of order two on an axis of revolution, moved to the covered part of it.
     Part(Part),
 }
 
@@ -109,9 +109,8 @@ impl PressureBasis {
     /// Choose the basis on facet `chunk[0].facet_a`, a simplex of `order` with `count` nodes. `chunk` holds the integration
     /// points of the part that the facets `b` of side b cover, and `axis` is the local node on the axis of revolution.
     ///
-    /// On an edge of order two or more int r phi of this node is zero if the edge is straight, and has either sign if it is curved. An edge of order two takes
-    /// the hat functions. On one of higher order this node carries no point: the integral is distributed over the other nodes, so that their weights
-    /// integrate polynomials of one degree less than the elements as before.
+    /// On an edge of order two or more this node carries no point. On a straight edge int r phi is zero there, and on a curved edge it has either sign: it
+    /// is distributed over the other nodes, so that their weights integrate polynomials of one degree less than the elements as before.
     ///
     /// Where these facets are apart, the distance jumps, and a dual mean would be beyond the distances on both sides of the jump: an overlap
     /// where there is none.
@@ -122,13 +121,14 @@ impl PressureBasis {
         b: &Facets<D>,
         axis: Option<usize>,
     ) -> Self {
-        if are_apart(b, chunk) || order == Order::P2 && axis.is_some() {
+        if are_apart(b, chunk) {
             return Self::Hats;
         }
         if order == Order::P2 && D == 3 {
             return Self::MidEdges.or_hats(order, &(D..2 * D).collect::<Vec<_>>(), chunk);
         }
-        let mut part = (D == 2 && order > Order::P2).then(|| Part::covered(chunk));
+        let of_parts = order > Order::P2 || order == Order::P2 && axis.is_some();
+        let mut part = (D == 2 && of_parts).then(|| Part::covered(chunk));
         if part.is_some_and(|part| part.ends[1] - part.ends[0] <= ROUNDING) {
             return Self::Hats;
         }

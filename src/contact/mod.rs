@@ -18,6 +18,6 @@ pub use fine::{Fine, FinePoint, FinePoints};
 pub use law::LayerLaw;
 #[cfg(test)]
 pub use law::Response;
-pub use pair::{ContactPair, Coverage, Fault, LostPieces, NodeDofs, add, assemble, moment_in_scene};
+pub use pair::{ContactPair, Coverage, Fault, LostPieces, add, assemble, moment_in_scene};
 pub use review::{Chords, ends};
 pub use side::Side;

@@ -6,11 +6,11 @@ use super::pieces::{Intersection, WHOLE};
 use super::side::{FaceNode, ROUNDING, Side, along};
 use crate::error::{Error, Result};
 use crate::fem::element::{self, Rule};
-use crate::fem::{Frame, Space, area_vector, cross, length, pad};
+use crate::fem::{NodeDofs, area_vector, cross, length, pad};
 use crate::linalg::{Csr, dot};
 use crate::problem::order::Order;
 use serde::{Deserialize, Deserializer, Serialize};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::rc::Rc;
 
 /// A discretised pair of surfaces: n contact points with one pressure each.
@@ -282,16 +282,6 @@ fn of_nodes<const D: usize>(side: &Side<D>, shares: &[(u32, f64)]) -> BTreeMap<u
     let mut sums = BTreeMap::new();
     shares.iter().for_each(|&(at, share)| *sums.entry(side.nodes[at as usize].node).or_default() += share);
     sums
-}
-
-/// How the nodes of a body move with its dofs.
-#[derive(Debug, Clone, Copy)]
-pub struct NodeDofs<'a, const D: usize> {
-    pub space: &'a Space<D>,
-    /// Dofs of nodes with rotated axes and of tied nodes.
-    pub frame: &'a Frame<D>,
-    /// Values of the prescribed dofs.
-    pub prescribed: &'a HashMap<usize, f64>,
 }
 
 /// Append the rows of a contact point for one side of a pair. `index` is 0 for side a and 1 for side b, `shares` holds the

@@ -2,9 +2,8 @@
 
 use super::law::LawMaker;
 use super::mirror::Mirrors;
-use super::pair::NodeDofs;
 use crate::error::Result;
-use crate::fem::{Facets, Frame, Space, area_vector, element, length, minus, unit};
+use crate::fem::{Facets, Frame, NodeDofs, Space, area_vector, element, length, minus, unit};
 use crate::linalg::{DisjointSets, axpy, bounds, dot};
 use crate::mesh::datum;
 use crate::problem::order::Order;

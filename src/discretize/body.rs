@@ -3,10 +3,9 @@
 
 use super::owned::OwnedDofs;
 use super::supports::Constraints;
-use crate::contact::NodeDofs;
 use crate::exchange::Plain;
 use crate::fem::interpolation::{coarse_nodes, from_vertices};
-use crate::fem::{NodalBlock, NodalForces, NodeGraph, PointExtent, Prolongation, RigidMotion, Space, rigid};
+use crate::fem::{NodalBlock, NodalForces, NodeDofs, NodeGraph, PointExtent, Prolongation, RigidMotion, Space, rigid};
 use crate::linalg::{Blocks, Csr, dot};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};

@@ -24,7 +24,7 @@ pub use assemble::{Couplings, ElasticBody, NodalBlock, NodalForces, NodeGraph, s
 pub use elasticity::Elasticity;
 pub use element::EDGES;
 pub use facets::{Facets, area_vector};
-pub use frame::{Frame, place};
+pub use frame::{Frame, NodeDofs, place};
 pub use interpolation::Prolongation;
 pub use recovery::{Errors, Recovery};
 pub use rigid::{PointExtent, RigidMotion};

@@ -277,14 +277,9 @@ fn shells_in_contact() {
                 assert_eq!(run.forces(0)[body][0], 0.0);
                 assert!(run.number(&format!("bodies/{body}/balance/force_imbalance")) < 1e-9);
             }
-            let axis = (0..table.rows()).find(|&q| table["x"][q] < 0.03).expect("a point at the axis");
-            let (estimated, exact) = (table["pressure_error"][axis], 8.485_601_823_078_518 - table["pressure"][axis]);
-            assert!(
-                // 0.7 to 2 without the safety of the sum of all points
-                degree == 1 || set.contains("ni=6,") || (0.7 / 1.25..2.0 / 1.25).contains(&(estimated / exact)),
-                "{estimated} {exact}"
-            );
-            (sum / area).sqrt()
+            let (estimated, exact) = (run.number("discretization_error/pressure/0"), (sum / area).sqrt());
+            assert!((0.7..2.0).contains(&(estimated / exact)), "{estimated} {exact}");
+            exact
         });
         println!("shells P{degree}: order {:.2}, {errors:?}", order(&errors));
         assert!(order(&errors) > least && errors[2] < last, "shells P{degree}: {errors:?}");
@@ -295,11 +290,11 @@ fn shells_in_contact() {
 /// points on that edge, have pressures that are 5e-3 off.
 #[test]
 fn few_curved_edges_at_the_axis() {
-    for (degree, most, points) in [(2, 1e-2, 8), (3, 1e-3, 12), (4, 1e-3, 16)] {
+    for (degree, most) in [(2, 5e-3), (3, 1e-3), (4, 1e-3)] {
         let orders = [0, 1].map(|body| format!("body.{body}.order={degree}"));
         let table = solved(case("shells"), &[&orders[0], &orders[1], "mesh.set={ni=4, no=4}"]).contact();
         let off = table["pressure"].iter().map(|p| (p / 8.485_601_823_078_518 - 1.0).abs()).fold(0.0, f64::max);
-        assert!(off < most && table.rows() == points, "P{degree}: {off:e}, {} points", table.rows());
+        assert!(off < most && table.rows() == 4 * degree, "P{degree}: {off:e}, {} points", table.rows());
     }
 }
 
@@ -361,13 +356,14 @@ fn hertz() {
     }
 }
 
-/// Meshes adapted to an error follow the estimate to the edge of the contact, and it is 0.7 to 2 times the true error there.
+/// Meshes adapted to an error follow the estimate to the edge of the contact, and it is 0.7 to 2 times the true error there. On finer ones the spheres
+/// are no half-spaces any more.
 #[test]
 fn hertz_on_an_adapted_mesh() {
     let title = format!("title=\"{}\"", nanoseconds());
-    let run = solve(case("hertz-sphere"), &["--tolerance", "0.02", "--set", &title]).converged();
+    let run = solve(case("hertz-sphere"), &["--tolerance", "0.03", "--set", &title]).converged();
     let estimated = run.number("discretization_error/pressure/0");
-    assert!(estimated < 0.02, "{estimated}");
+    assert!(estimated < 0.03, "{estimated}");
     let table = run.contact();
     let of = |value: &dyn Fn(f64, f64) -> f64| -> f64 {
         (0..table.rows()).map(|q| table["weight"][q] * value(table["x"][q], table["pressure"][q]).powi(2)).sum()

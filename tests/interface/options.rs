@@ -196,7 +196,7 @@ fn a_factorisation_that_is_none_bounds_nothing() {
 /// An inaccurate result with three digits tells the tolerance that accepts it.
 #[test]
 fn an_inaccurate_result_tells_what_accepts_it() {
-    let options = "-ksp_type cg -pc_type icc -ksp_atol 1e-6";
+    let options = "--method newton-robin -ksp_type cg -pc_type icc -ksp_atol 1e-6";
     let refused = held(options);
     assert_eq!(refused.text("status"), "inaccurate", "{}", refused.said());
     let message = refused.text("message");
