@@ -217,7 +217,7 @@ fn bad_meshes_are_refused_by_name_and_line() {
     for (bytes, expected) in [
         (square("", &["-2", "-format", "msh40"]), "a.msh:2: this is version 4 of the mesh format"),
         (square("", &["-2", "-format", "msh1"]), "a.msh:1: this is not a mesh file of Gmsh"),
-        (square("", &["-2", "-order", "9"]), "elements of Gmsh's type 66 cannot be used"),
+        (square("", &["-2", "-order", "9"]), "elements of Gmsh's type 65 cannot be used"),
         (square("Physical Curve(77) = {3};", &["-2"]), "physical curve 77 has no name"),
         (square("Physical Curve(\"gone\") = {99};", &["-2"]), "the physical curve `gone` has no elements"),
         (square("Physical Curve(\"steel\") = {7};", &["-2"]), "two physical groups are named `steel`"),

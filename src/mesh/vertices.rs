@@ -153,7 +153,8 @@ impl Mesh<2> {
         for (point, share) in inner {
             (0..2).for_each(|c| self.points[point as usize][c] += share * step[c]);
         }
-        passage.iter().zip(points).for_each(|(&point, x)| self.points[point as usize] = x);
+        // the ends stay to the last digit
+        passage.iter().zip(points).skip(1).take(2 * degree - 1).for_each(|(&at, x)| self.points[at as usize] = x);
         true
     }
 }
