@@ -75,8 +75,8 @@ fn is_folded(x: &[[f64; 3]], dimension: usize) -> bool {
 
 /// Bernstein's basis for the maps of simplices of one order and dimension.
 ///
-/// With the control points b of degree k, the derivative along the edge 0a has the control points k (b_(p + e_a) - b_(p
-/// + e_0)), where p are powers of degree k - 1. A coefficient of a product of polynomials is the mean of the products
+/// With the control points b of degree k, the derivative along the edge 0a has the control points k (b_(p+e_a) -
+/// b_(p+e_0)), where p are powers of degree k - 1. A coefficient of a product of polynomials is the mean of the products
 /// of theirs, with multinomial weights.
 struct Bernstein {
     /// Matrix from the points of the simplex to its control points.
