@@ -144,7 +144,7 @@ impl Solution {
     }
 
     /// Return for each node of [`Solution::body`] its index among the points of the mesh. These are [`MeshArrays::points`], or the points of a
-    /// file that a group uses. Nodes of orders above two that are not vertices have `u32::MAX`.
+    /// file that a group uses. Nodes that are not vertices have `u32::MAX` if the order of the body or of the mesh is above two.
     ///
     /// # Panics
     /// When there is no such body.

@@ -22,7 +22,7 @@ pub struct FinePoint {
     /// Length (area) of the point.
     pub weight: f64,
     /// Distance of the surfaces along the normal plus the gap that the scene adds. Between surfaces that do not touch as wholes, it is
-    /// less by the heights of both curved surfaces above their straight facets (`rise`), and by what is unsure of a curve ([`Heights`](super::curve::Heights)).
+    /// less by the heights of both curved surfaces above their straight facets (`rise`).
     pub gap: f64,
     /// Facet of side a under the point. Points on one facet follow each other.
     pub facet: usize,
@@ -109,11 +109,7 @@ impl<const D: usize> Fine<D> {
         let rounding = a.rounding_along_normals();
         let rise_of_both = |point: &IntegrationPoint<D>| match touching {
             true => 0.0,
-            false => {
-                let [on_a, on_b] = &common.heights;
-                let unsure = on_a.unsure(point.facet_a, &point.at_a) + on_b.unsure(point.facet_b, &point.at_b);
-                rise(a, point.facet_a, &point.at_a) + rise(b, point.facet_b, &point.at_b) + unsure
-            }
+            false => rise(a, point.facet_a, &point.at_a) + rise(b, point.facet_b, &point.at_b),
         };
         let at_rim = facets_at_rim(a, b, common, &pair.cover, jumps);
         let normal_a = |point: &IntegrationPoint<D>| vector_at(a, point.facet_a, &point.at_a, |at| at.normal);
@@ -306,13 +302,11 @@ impl<const D: usize> Projections<D> {
         let rounding = a.rounding_along_normals();
         let position = |q: usize| -> [f64; D] { std::array::from_fn(|c| pair.position[q][c] - a.space.datum[c]) };
         let mut projections = Self::default();
-        for (q, [facet_a, facet]) in nearest_facets(a, common, pair, position).into_iter().enumerate() {
+        for (q, facet) in nearest_facets(a, common, pair, position).into_iter().enumerate() {
             let (from, normal) = (position(q), std::array::from_fn(|c| pair.normal[q][c]));
             let at = project(b, facet, from, normal);
-            let [on_a, on_b] = &common.heights;
-            let height = || on_a.at(facet_a, &project(a, facet_a, from, normal)) + on_b.at(facet, &at);
             let difference = |gap: &dyn Fn([f64; 3]) -> f64| {
-                pair.gap[q] - gap(pair.position[q]) - (distance(b, facet, &at, from, normal) - height())
+                pair.gap[q] - gap(pair.position[q]) - distance(b, facet, &at, from, normal)
             };
             // Between planes the difference is no more than the rounding of the coordinates.
             let rounding = rounding.max(1e-12 * length(b.area(facet)).powf(1.0 / (D - 1) as f64));
@@ -326,25 +320,26 @@ impl<const D: usize> Projections<D> {
     }
 }
 
-/// Return the facets of both sides for each contact point: that of side a at its node with the nearest integration point, and the partner of this point. `position` gives the place of a contact point, measured from the datum of the mesh.
+/// Return the facet of side b for each contact point: the partner of the nearest integration point on the facets of
+/// side a at its node. `position` gives the place of a contact point, measured from the datum of the mesh.
 fn nearest_facets<const D: usize>(
     a: &Side<D>,
     common: &Intersection<D>,
     pair: &ContactPair,
     position: impl Fn(usize) -> [f64; D],
-) -> Vec<[usize; 2]> {
+) -> Vec<usize> {
     let point_of = pair.point_of(a.nodes.len());
-    let mut nearest = vec![(f64::INFINITY, [0, 0]); pair.len()];
+    let mut nearest = vec![(f64::INFINITY, 0); pair.len()];
     for point in &common.points {
         let from = a.facets.point(point.facet_a, a.space, &point.at_a);
         for q in a.on_facet(point.facet_a).iter().filter_map(|&node| point_of[node as usize]) {
             let distance = length(minus(position(q), from));
             if distance < nearest[q].0 {
-                nearest[q] = (distance, [point.facet_a, point.facet_b]);
+                nearest[q] = (distance, point.facet_b);
             }
         }
     }
-    nearest.into_iter().map(|(_, facets)| facets).collect()
+    nearest.into_iter().map(|(_, facet)| facet).collect()
 }
 
 /// Return where the line from a point along a normal meets the plane of a facet's corners, in barycentric coordinates.

@@ -4,7 +4,6 @@
 //! (areas, rows B_a and B_b, gaps), which does not depend on the dimension. The laws of layers are in [`law`].
 
 mod basis;
-mod curve;
 mod fine;
 pub mod law;
 mod mirror;

@@ -65,15 +65,19 @@ fn facing<const D: usize>(a: &Side<D>, b: &Side<D>, common: &Intersection<D>) ->
     let mut sums = vec![none; a.nodes.len()];
     for chunk in common.points.chunk_by(|p, q| p.facet_a == q.facet_a) {
         let on = a.on_facet(chunk[0].facet_a);
-        // The vertices, between which directions are interpolated, need not carry points; the nodes between them do so by their own functions.
+        // The vertices, between which directions are interpolated, need not carry points up to order two; all other nodes do so by their own functions.
+        let linear = if a.facets.order <= Order::P2 { D } else { 0 };
         let [vertices, all] = [(Order::P1, D), (a.facets.order, on.len())]
             .map(|(order, count)| PressureBasis::on(order, count, chunk, &b.facets, a.axis_of(chunk[0].facet_a)));
         for point in chunk {
             let phi = element::values(a.facets.order, &point.at_a);
             let before = surface_at(b, point.facet_b, &point.at_b);
             for (i, &at) in on.iter().enumerate() {
-                let value =
-                    if i < D { vertices.value(i, &point.at_a, &point.at_a) } else { all.value(i, &phi, &point.at_a) };
+                let value = if i < linear {
+                    vertices.value(i, &point.at_a, &point.at_a)
+                } else {
+                    all.value(i, &phi, &point.at_a)
+                };
                 let (mu, sum) = (point.weight * value, &mut sums[at as usize]);
                 sum.weight += mu;
                 sum.area += point.weight;

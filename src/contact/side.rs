@@ -6,6 +6,7 @@ use crate::error::Result;
 use crate::fem::{Facets, Frame, NodeDofs, Space, area_vector, element, length, minus, unit};
 use crate::linalg::{DisjointSets, axpy, bounds, dot};
 use crate::mesh::datum;
+use crate::problem::order::Order;
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// One contact surface of a body.
@@ -138,20 +139,29 @@ impl<'a, const D: usize> Side<'a, D> {
     fn bend(&mut self) {
         let flat = self.tilt().max(ROUNDING);
         for i in 0..self.facets.count() {
-            let (x, on) = (self.facets.coordinates(i, self.space), self.on_facet(i).to_vec());
-            let mut curvature: f64 = 0.0;
-            for k in 0..on.len() {
-                for l in 0..k {
-                    let [p, q] = [on[k], on[l]].map(|corner| self.nodes[corner as usize].normal);
-                    let turn = length(minus(p, q));
-                    curvature = curvature.max(if turn > flat { turn / length(minus(x[k], x[l])) } else { 0.0 });
-                }
-            }
+            let (turns, on) = (self.turns(i), self.on_facet(i).to_vec());
+            let bent = turns.into_iter().filter(|(turn, _)| *turn > flat);
+            let curvature = bent.map(|(turn, over)| turn / over).fold(0.0, f64::max);
             for corner in on {
                 let largest = &mut self.nodes[corner as usize].curvature;
                 *largest = largest.max(curvature);
             }
         }
+    }
+
+    /// Return by how much the normal of facet `i` turns, and over which lengths: between its nodes, or on an edge of an order above two by the height
+    /// above its chord, which has more digits than the tangents.
+    fn turns(&self, i: usize) -> Vec<(f64, f64)> {
+        let (x, on) = (self.facets.coordinates(i, self.space), self.on_facet(i));
+        if self.facets.order > Order::P2 {
+            let [from, to, middle] = [x[0], x[1], self.facets.point(i, self.space, &[0.5; D])];
+            let (chord, along, off) = (length(minus(to, from)), unit(minus(to, from)), minus(middle, from));
+            let height = length::<D>(std::array::from_fn(|c| off[c] - dot(&off, &along) * along[c]));
+            return vec![(8.0 * height / chord, chord)];
+        }
+        let normal = |k: usize| self.nodes[on[k] as usize].normal;
+        let pairs = (0..on.len()).flat_map(|k| (0..k).map(move |l| (k, l)));
+        pairs.map(|(k, l)| (length(minus(normal(k), normal(l))), length(minus(x[k], x[l])))).collect()
     }
 
     /// Return how the nodes move with the dofs of the body.

@@ -231,7 +231,7 @@ pub fn parts<'a, const D: usize>(
         let checked = &checked[index];
         refuse_parts(spec, &space, &checked.parts, mesh)?;
         let elasticity = elasticity(spec, &space, mesh, scene.plane)?;
-        let (points, extent) = (space.points_of_nodes(), PointExtent::of(space.nodes.iter().copied()));
+        let (points, extent) = (space.points_of_nodes(mesh.order), PointExtent::of(space.nodes.iter().copied()));
         let held = Constraints::new(spec, &space, mesh)?;
         let springs =
             spec.spring.iter().map(|spring| spring_blocks(spring, spec, &space, mesh)).collect::<Result<_>>()?;

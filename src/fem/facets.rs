@@ -180,14 +180,6 @@ impl<const D: usize> Facets<D> {
         element::interpolate(&self.coordinates(i, space), &element::values(self.order, l))
     }
 
-    /// Return the coordinates of the nodes of the linear or quadratic element that has the shape of facet `i`.
-    pub fn shape(&self, i: usize, space: &Space<D>) -> Vec<[f64; D]> {
-        match self.order {
-            Order::P1 | Order::P2 => self.coordinates(i, space),
-            _ => element::nodes::<D>(Order::P2).iter().map(|l| self.point(i, space, l)).collect(),
-        }
-    }
-
     /// Return the coordinates of the nodes of facet `i`.
     pub fn coordinates(&self, i: usize, space: &Space<D>) -> Vec<[f64; D]> {
         self.facet(i).iter().map(|&node| space.nodes[node as usize]).collect()

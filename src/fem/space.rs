@@ -1,10 +1,10 @@
 //! The finite element space of one body: its nodes and cells, numbered within the body, and displacements at points of cells.
 
-use super::element::{self, EDGES, Gradients, Rule, Slopes, Values};
+use super::element::{self, Gradients, Rule, Slopes, Values};
 use super::{cross, lagrange, minus, pad};
 use crate::exchange::Plain;
 use crate::linalg::dot;
-use crate::mesh::{Group, Mesh, Numbering, datum};
+use crate::mesh::{self, Group, Mesh, Numbering, datum};
 use crate::problem::order::Order;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -30,11 +30,11 @@ pub struct Space<const D: usize> {
     pub cells: Vec<u32>,
     /// Whether this is the meridian of a body of revolution, where x is the radius and y runs along the axis.
     pub axisymmetric: bool,
-    /// Body node of each mesh point that is one; unknown in a part of a body.
+    /// Body node of each vertex of the mesh; unknown in a part of a body.
     #[serde(skip)]
     from_mesh: Numbering,
-    /// First of the nodes inside each edge for the point of the mesh in its middle, if there are several. They lie in the direction from the end with the
-    /// lower number in the mesh to the other one.
+    /// First of the nodes inside each edge for the [point](edge_point) of the mesh that stands for the edge. They lie in
+    /// the direction from the end with the lower number in the mesh to the other one.
     #[serde(skip)]
     edges: Numbering,
     /// Area (volume) of all cells, once it has been requested.
@@ -43,15 +43,14 @@ pub struct Space<const D: usize> {
 }
 
 impl<const D: usize> Space<D> {
-    /// Make the space of `order` on the cells of `group` (of dimension `D`). The order of the mesh is at least `order`.
+    /// Make the space of `order` on the cells of `group` (of dimension `D`). The mesh is not linear unless `order` is
+    /// 1.
+    ///
+    /// Vertices are points of the mesh, and other nodes lie on the map of the cell.
     pub fn new(mesh: &Mesh<D>, group: &Group, order: Order) -> Self {
         let stride = element::node_count(D + 1, order);
-        let shape = element::node_count(D + 1, order.of_shape());
-        let points = || group.connectivity.chunks_exact(group.stride).map(|cell| &cell[..shape]);
-        let numbering = |is_node: bool| {
-            let chosen = move |k: &usize| is_node == (order == Order::P2 || *k <= D);
-            Numbering::new(points().flat_map(move |cell| (0..shape).filter(chosen).map(|k| cell[k])))
-        };
+        let cells = || group.connectivity.chunks_exact(group.stride);
+        let edges = || cells().filter(move |_| order > Order::P1).flat_map(|cell| mesh::edges(cell, D));
         let mut space = Space {
             order,
             nodes: Vec::new(),
@@ -60,43 +59,42 @@ impl<const D: usize> Space<D> {
             stride,
             cells: Vec::with_capacity(group.connectivity.len() / group.stride * stride),
             axisymmetric: false,
-            from_mesh: numbering(true),
-            edges: numbering(false),
+            from_mesh: Numbering::new(cells().flat_map(|cell| &cell[..=D]).copied()),
+            edges: Numbering::new(edges().map(|(_, inside)| edge_point(inside))),
             measure: OnceCell::new(),
         };
-        let places = if order > Order::P2 { lagrange::of(order, D + 1).nodes.clone() } else { Vec::new() };
-        points().for_each(|cell| space.add_cell(mesh, cell, &places));
+        let places = (D + 1..stride).map(|node| element::place(order, D + 1, node));
+        let weights: Vec<Vec<f64>> = places.map(|l| mesh::weights(mesh.order, &l[..=D])).collect();
+        cells().for_each(|cell| space.add_cell(mesh, cell, &weights));
         space
     }
 
-    /// Add the nodes of a cell of the mesh. `places` are the barycentric coordinates of the nodes of orders above two, which lie where the quadratic cell
-    /// of the mesh has them.
-    fn add_cell(&mut self, mesh: &Mesh<D>, cell: &[u32], places: &[[f64; 3]]) {
+    /// Add the nodes of a cell of the mesh. Those that are no vertices have these `weights` of its points.
+    fn add_cell(&mut self, mesh: &Mesh<D>, cell: &[u32], weights: &[Vec<f64>]) {
         let at = |point: &u32| mesh.points[*point as usize];
-        let whole = places.is_empty();
-        for point in &cell[..if whole { cell.len() } else { D + 1 }] {
+        for point in &cell[..=D] {
             let (node, is_new) = self.from_mesh.number(*point, self.nodes.len() as u32);
             if is_new {
                 self.nodes.push(at(point));
             }
             self.cells.push(node);
         }
-        if whole {
+        if self.order == Order::P1 {
             return;
         }
         let x: Vec<[f64; D]> = cell.iter().map(at).collect();
-        let place = |local: usize| element::interpolate(&x, &element::values(Order::P2, &places[local]));
+        let place = |local: usize| element::interpolate(&x, &weights[local - D - 1]);
         let count = self.order.degree() as u32 - 1;
-        for (&middle, &(i, j)) in cell[D + 1..].iter().zip(&EDGES) {
+        for ([i, j], inside) in mesh::edges(cell, D) {
             let is_forward = cell[i] < cell[j];
-            let (first, is_new) = self.edges.number(middle, self.nodes.len() as u32);
+            let (first, is_new) = self.edges.number(edge_point(inside), self.nodes.len() as u32);
             if is_new {
                 let ends = if is_forward { [i, j] } else { [j, i] };
                 self.nodes.extend(element::inside_edge(self.order, D + 1, ends).map(place));
             }
             self.cells.extend((0..count).map(|k| first + if is_forward { k } else { count - 1 - k }));
         }
-        for local in (D + 1) + (cell.len() - D - 1) * count as usize..self.stride {
+        for local in D + 1 + D * (D + 1) / 2 * count as usize..self.stride {
             self.cells.push(self.nodes.len() as u32);
             self.nodes.push(place(local));
         }
@@ -131,8 +129,8 @@ impl<const D: usize> Space<D> {
 
     /// Return the space with other nodes and cells, which has no link to points of the mesh.
     pub fn with(&self, nodes: Vec<[f64; D]>, cells: Vec<u32>) -> Self {
-        let (from_mesh, edges) = (Numbering::default(), Numbering::default());
-        Space { nodes, cells, from_mesh, edges, measure: OnceCell::new(), ..*self }
+        let none = Numbering::default;
+        Space { nodes, cells, from_mesh: none(), edges: none(), measure: OnceCell::new(), ..*self }
     }
 
     /// Turn the space into the meridian of a body of revolution.
@@ -202,18 +200,15 @@ impl<const D: usize> Space<D> {
         self.from_mesh.points().chain(self.edges.points())
     }
 
-    /// Return the point of the mesh that each node is, or [`Space::NO_POINT`].
-    pub fn points_of_nodes(&self) -> Vec<u32> {
-        let mut points = vec![Self::NO_POINT; self.nodes.len()];
-        for point in self.from_mesh.points() {
-            self.from_mesh.get(point).into_iter().for_each(|node| points[node as usize] = point);
+    /// Return the point of a mesh of some order that each node is, or `u32::MAX` for those on maps of its cells.
+    pub fn points_of_nodes(&self, mesh: Order) -> Vec<u32> {
+        let mut points = vec![u32::MAX; self.nodes.len()];
+        let middles = (self.order.max(mesh) == Order::P2).then_some(&self.edges);
+        for numbering in [&self.from_mesh].into_iter().chain(middles) {
+            numbering.points().for_each(|at| numbering.get(at).into_iter().for_each(|node| points[node as usize] = at));
         }
         points
     }
-
-    /// What stands for the point of the mesh of a node that is none: one within an edge or a cell of order three or more. It is the number of no point,
-    /// since a mesh has at most as many points as there are numbers below it.
-    pub const NO_POINT: u32 = u32::MAX;
 
     /// Return the contribution of a cell to the measure of the body, from its corners. In a body of revolution it is the volume of a
     /// ring.
@@ -299,15 +294,10 @@ impl<const D: usize> Space<D> {
     /// Return the body's nodes of one simplex of a mesh group, or `None` if it is not part of this body: vertices, then those on edges, which are
     /// not sorted above order two. Nodes inside the simplex are left out.
     pub(super) fn simplex(&self, points: &[u32], dimension: usize) -> Option<Vec<u32>> {
-        let vertices = dimension + 1;
-        let wanted = element::node_count(vertices, self.order.of_shape());
-        let [own, edges] = if self.order > Order::P2 { [vertices, wanted] } else { [wanted, wanted] };
-        let mut nodes = Vec::with_capacity(wanted);
-        for &point in &points[..own] {
-            nodes.push(self.from_mesh.get(point)?);
-        }
-        for &middle in &points[own..edges] {
-            let first = self.edges.get(middle)?;
+        let vertices = points[..=dimension].iter().map(|&point| self.from_mesh.get(point));
+        let mut nodes = vertices.collect::<Option<Vec<u32>>>()?;
+        for (_, inside) in mesh::edges(points, dimension).filter(|_| self.order > Order::P1) {
+            let first = self.edges.get(edge_point(inside))?;
             nodes.extend(first..first + self.order.degree() as u32 - 1);
         }
         Some(nodes)
@@ -333,6 +323,11 @@ impl<const D: usize> Space<D> {
         nodes.dedup();
         nodes
     }
+}
+
+/// Return the point of the mesh that stands for the edge with these points inside: the middle of a quadratic one.
+fn edge_point(inside: &[u32]) -> u32 {
+    inside.iter().copied().min().unwrap_or_default()
 }
 
 /// A point of a cell, with the shape functions of the cell there.

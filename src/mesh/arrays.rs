@@ -16,6 +16,10 @@ const NAME: &str = "mesh arrays";
 /// the same name. A group has numbers of points that do not exist, simplices without extent, or a dimension above `D`.
 pub fn mesh<const D: usize>(arrays: &MeshArrays, order: Order) -> Result<Mesh<D>> {
     let MeshArrays { points, order: own, groups } = arrays;
+    if *own > Order::highest(D) {
+        let message = format!("simplices have the order {}, in space at most {}", own.degree(), Order::P2.degree());
+        return Err(refuse_arrays(message).help("give the points of order 2: corners and mid-edges"));
+    }
     let largest = points.iter().flatten().fold(0.0_f64, |size, x| size.max(x.abs()));
     if let Some(number) = points.iter().position(|x| x.iter().any(|x| !x.is_finite())) {
         return Err(refuse_arrays(format!("point {number} has the coordinates {:?}", points[number])));
@@ -30,13 +34,12 @@ pub fn mesh<const D: usize>(arrays: &MeshArrays, order: Order) -> Result<Mesh<D>
     }
     let points = points.iter().map(|x| std::array::from_fn(|c| x[c])).collect();
     let mesh = Mesh::new(NAME.into(), points, *own, groups.into());
-    Ok(if *own < order { mesh.higher_order() } else { mesh })
+    Ok(if *own == Order::P1 && order > Order::P1 { mesh.higher_order(Order::P2) } else { mesh })
 }
 
 fn group_of<const D: usize>(arrays: &GroupArrays, points: &[[f64; 3]], order: Order) -> Result<Group> {
     let GroupArrays { name, dimension, connectivity } = arrays;
-    let (corners, edges) = (dimension + 1, dimension * (dimension + 1) / 2);
-    let stride = if order == Order::P1 { corners } else { corners + edges };
+    let stride = simplex::stride(*dimension, Some(order));
     let refuse = |what: String| refuse_arrays(format!("group `{name}` {what}"));
     if name.is_empty() || *dimension > D {
         return Err(refuse(format!("is of dimension {dimension}"))
@@ -45,7 +48,7 @@ fn group_of<const D: usize>(arrays: &GroupArrays, points: &[[f64; 3]], order: Or
     if connectivity.is_empty() || connectivity.len() % stride != 0 {
         let count = connectivity.len();
         return Err(refuse(format!("has {count} numbers of points, its simplices have {stride} each"))
-            .help("give one number a corner, and for order 2 one a mid-edge point, too"));
+            .help("give one number a corner, and for order k the k - 1 points inside each edge, too"));
     }
     if let Some(number) = connectivity.iter().find(|number| **number as usize >= points.len()) {
         return Err(
@@ -103,5 +106,10 @@ mod tests {
         bad(|a| a.groups[0].connectivity[4] = 7, Order::P1, "has point 7");
         bad(|a| a.groups[0].connectivity[1] = 0, Order::P1, "simplex 0, of the points [0, 0, 2]");
         bad(|a| a.order = Order::P2, Order::P2, "simplices have 3 each");
+        let third = Order::new(3).expect("an order");
+        let solid = MeshArrays { order: third, ..square() };
+        assert!(mesh::<2>(&solid, third).expect_err("nine points").to_string().contains("simplices have 9 each"));
+        let error = super::mesh::<3>(&solid, third).expect_err("order 3 in space").to_string();
+        assert!(error.contains("simplices have the order 3, in space at most 2"), "{error}");
     }
 }

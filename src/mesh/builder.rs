@@ -1,11 +1,12 @@
 //! From the nodes and elements of a file, in its numbers, to a [`Mesh`].
 //!
-//! Some programs write the boundary of quadratic cells as linear lines and facets. These get the mid-edge nodes of the cells.
+//! Some programs write the boundary of curved cells as linear lines and facets. These get the nodes inside the edges of
+//! the cells.
 
 use super::Mesh;
 use super::groups::{self, Group, Numbering};
 use super::scan::{DAMAGED, Flaw};
-use super::simplex::{self, EDGES, ElementType, THINGS};
+use super::simplex::{self, ElementType, THINGS};
 use super::split::Middles;
 use crate::error::{Error, Result};
 use crate::problem::body::plain;
@@ -52,7 +53,7 @@ pub struct MeshBuilder<const D: usize> {
 }
 
 /// The advice about elements of higher orders.
-const ORDERS: &str = "use elements of order 1 or 2: `gmsh -order 2`";
+const ORDERS: &str = "use elements of order 1 or 2, in the plane up to 8: `gmsh -order 2`";
 
 /// Return an element type of Gmsh.
 pub fn kind_of(number: i32) -> std::result::Result<ElementType, Flaw> {
@@ -144,12 +145,12 @@ impl<const D: usize> MeshBuilder<D> {
     pub fn check_type(&mut self, kind: ElementType, groups: &[usize]) -> std::result::Result<(), Flaw> {
         let Some(&group) = groups.first() else { return Ok(()) };
         let name = &self.groups[group].name;
-        if !kind.is_known() {
-            let ElementType { shape, nodes, number } = kind;
+        if kind.order > Some(Order::highest(D)) {
+            let ElementType { shape, nodes, number, .. } = kind;
             let what = format!("group `{name}` has {} elements of {nodes} nodes (Gmsh's type {number})", shape.name);
             return Err(Flaw::new(what, ORDERS));
         }
-        let Some(order) = kind.order() else { return Ok(()) };
+        let Some(order) = kind.order else { return Ok(()) };
         match self.orders[kind.shape.dimension].get_or_insert((order, group)).0 == order {
             true => Ok(()),
             false => Err(other_order(name)),
@@ -182,11 +183,11 @@ impl<const D: usize> MeshBuilder<D> {
         let mut simplices = match kind.is_divided() {
             true => Middles { points: &mut self.points, known: &mut self.middles }.simplices(kind, &own),
             false => {
-                simplex::from_gmsh_order(&mut own);
+                kind.reorder(&mut own);
                 own
             }
         };
-        let (dimension, stride) = (kind.shape.dimension, kind.stride());
+        let (dimension, stride) = (kind.shape.dimension, simplex::stride(kind.shape.dimension, kind.order));
         for simplex in simplices.chunks_exact_mut(stride) {
             if !simplex::turn(simplex, &self.points, dimension, D) {
                 let size = ["", "length", "area", "volume"][dimension];
@@ -232,8 +233,8 @@ impl<const D: usize> MeshBuilder<D> {
             let Flaw { what, help } = other_order(&self.groups[*group].name);
             return Err(fail(what).help(help));
         }
-        if order == Some(Order::P2) {
-            raise(&mut self.groups, &mut self.points, D);
+        if let Some(order) = order.filter(|order| *order > Order::P1) {
+            groups::raise(&mut self.groups, &mut self.points, order, D);
         }
         // Empty groups of other programs are dropped.
         let mut groups = self.groups;
@@ -265,35 +266,4 @@ impl<const D: usize> MeshBuilder<D> {
 fn other_order(group: &str) -> Flaw {
     let what = format!("group `{group}` is of another order than other elements");
     Flaw::new(what, "save all elements with one order: gmsh -order 1 or 2")
-}
-
-/// Give linear elements below the dimension `space` of quadratic cells the mid-edge nodes of the cells. Elements that are no
-/// edges or facets of cells get new nodes, with straight edges.
-fn raise(groups: &mut [Group], points: &mut Vec<[f64; 3]>, space: usize) {
-    let is_linear = |group: &&mut Group| group.dimension > 0 && group.stride == group.dimension + 1;
-    if !groups.iter_mut().any(|group| is_linear(&group)) {
-        return;
-    }
-    let sorted = |a: u32, b: u32| [a.min(b), a.max(b)];
-    let mut of_edge: HashMap<[u32; 2], u32> = HashMap::new();
-    for cell in groups.iter().filter(|group| group.dimension == space).flat_map(Group::simplices) {
-        let middles = EDGES.iter().zip(&cell[space + 1..]);
-        of_edge.extend(middles.map(|([a, b], middle)| (sorted(cell[*a], cell[*b]), *middle)));
-    }
-    for group in groups.iter_mut().filter(is_linear) {
-        let (vertices, edges) = (group.stride, group.dimension * (group.dimension + 1) / 2);
-        let mut connectivity = Vec::with_capacity(group.len() * (vertices + edges));
-        for simplex in group.simplices() {
-            connectivity.extend_from_slice(simplex);
-            for &[a, b] in &EDGES[..edges] {
-                let ends = sorted(simplex[a], simplex[b]);
-                connectivity.push(*of_edge.entry(ends).or_insert_with(|| {
-                    let [a, b] = ends.map(|end| points[end as usize]);
-                    points.push(std::array::from_fn(|c| 0.5 * (a[c] + b[c])));
-                    (points.len() - 1) as u32
-                }));
-            }
-        }
-        (group.stride, group.connectivity) = (vertices + edges, connectivity);
-    }
 }

@@ -5,7 +5,8 @@ use super::EDGES;
 /// The cells of a body of simplices, with nodes numbered within the body.
 #[derive(Debug, Clone, Copy)]
 pub struct Simplices<'a, const D: usize> {
-    /// Nodes of all cells, `stride` per cell: corners, then mid-edge nodes in the local numbering of [`Mesh`](super::Mesh).
+    /// Nodes of all cells, `stride` per cell: corners, then those inside edges in the local numbering of
+    /// [`Mesh`](super::Mesh).
     pub nodes: &'a [u32],
     /// Nodes per cell.
     pub stride: usize,
@@ -18,7 +19,7 @@ impl<'a, const D: usize> Simplices<'a, D> {
     }
 
     /// Return whether edges have nodes between their ends.
-    pub fn is_quadratic(self) -> bool {
+    pub fn is_curved(self) -> bool {
         self.stride > D + 1
     }
 
@@ -27,10 +28,12 @@ impl<'a, const D: usize> Simplices<'a, D> {
         &self.nodes[cell * self.stride..][..self.stride]
     }
 
-    /// Return the mid-edge node of a cell between two of its corners.
-    pub fn middle(self, cell: usize, [i, j]: [usize; 2]) -> u32 {
-        let ends = [i.min(j), i.max(j)];
-        self.cell(cell)[D + 1 + EDGES.iter().position(|edge| *edge == ends).unwrap_or(0)]
+    /// Return the nodes of a cell inside the edge from one of its corners to another one.
+    pub fn inside(self, cell: usize, [i, j]: [usize; 2]) -> impl DoubleEndedIterator<Item = u32> + use<'a, D> {
+        let count = 2 * (self.stride - D - 1) / (D * (D + 1));
+        let edge = EDGES.iter().position(|edge| *edge == [i.min(j), i.max(j)]).unwrap_or(0);
+        let nodes = &self.cell(cell)[D + 1 + edge * count..][..count];
+        (0..count).map(move |k| nodes[if i < j { k } else { count - 1 - k }])
     }
 }
 
@@ -80,13 +83,12 @@ impl<const D: usize> Face<D> {
         std::array::from_fn(|i| OUTWARD[D - 2][self.opposite()][i])
     }
 
-    /// Return the nodes, in the order in which the normal points outwards. The corners come first, then in a quadratic cell the
-    /// mid-edge nodes between 01, 12, 02.
+    /// Return the nodes, in the order in which the normal points outwards. The corners come first, then the nodes
+    /// inside the edges 01, 12, 02.
     pub fn nodes(self, cells: Simplices<D>) -> impl Iterator<Item = u32> {
         let (cell, corners) = (self.cell(), self.corners());
-        let edges = if cells.is_quadratic() { D * (D - 1) / 2 } else { 0 };
-        let ends = EDGES[..edges].iter().map(move |edge| edge.map(|i| corners[i]));
-        corners.into_iter().map(move |i| cells.cell(cell)[i]).chain(ends.map(move |ends| cells.middle(cell, ends)))
+        let ends = EDGES[..D * (D - 1) / 2].iter().map(move |edge| edge.map(|i| corners[i]));
+        corners.into_iter().map(move |i| cells.cell(cell)[i]).chain(ends.flat_map(move |ends| cells.inside(cell, ends)))
     }
 }
 

@@ -156,10 +156,9 @@ impl Gmsh {
             }
             None => Command::new(&self.program),
         };
-        let order = if task.order == Order::P1 { "1" } else { "2" };
         match task.is_mesh {
             true => command.arg("-save"),
-            false => command.arg(format!("-{}", task.dimension)).args(["-order", order]),
+            false => command.arg(format!("-{}", task.dimension)).args(["-order", &task.order.degree().to_string()]),
         };
         command.args(["-format", "msh41", "-bin", "-v", "2"]);
         if task.algorithm == Algorithm::Hxt {

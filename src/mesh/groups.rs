@@ -1,7 +1,11 @@
 //! The groups of a mesh by name, and compact numberings of their points.
 
+use super::shape::{edges, on_chord, turned};
+use super::simplex::EDGES;
 use crate::problem::body::plain;
+use crate::problem::order::Order;
 use serde::{Deserialize, Serialize};
+use smallvec::SmallVec;
 use std::collections::{HashMap, HashSet};
 use std::ops::{Deref, DerefMut};
 
@@ -134,6 +138,41 @@ pub fn renumber(groups: &mut [Group]) -> Vec<u32> {
         *point = number.get(*point).unwrap_or(ABSENT);
     }
     number.points().collect()
+}
+
+/// Give linear simplices points inside their edges: those of the cells of dimension `space` that have an order above
+/// one, else new ones on straight edges.
+pub fn raise<const N: usize>(groups: &mut [Group], points: &mut Vec<[f64; N]>, order: Order, space: usize) {
+    let inside = order.degree() - 1;
+    let is_linear = |group: &&mut Group| group.dimension > 0 && group.stride == group.dimension + 1;
+    if !groups.iter_mut().any(|group| is_linear(&group)) {
+        return;
+    }
+    // the points of each edge from its end with the smaller number
+    let mut of_edge: HashMap<[u32; 2], SmallVec<[u32; 2]>> = HashMap::new();
+    for cell in groups.iter().filter(|group| group.dimension == space).flat_map(Group::simplices) {
+        for (ends, nodes) in edges(cell, space) {
+            let [a, b] = ends.map(|end| cell[end]);
+            of_edge.insert([a.min(b), a.max(b)], turned(nodes, a > b));
+        }
+    }
+    for group in groups.iter_mut().filter(is_linear) {
+        let edges = &EDGES[..group.dimension * (group.dimension + 1) / 2];
+        let mut connectivity = Vec::with_capacity(group.len() * (group.stride + edges.len() * inside));
+        for simplex in group.simplices() {
+            connectivity.extend_from_slice(simplex);
+            for [a, b] in edges.iter().map(|edge| edge.map(|corner| simplex[corner])) {
+                let [low, high] = [a.min(b), a.max(b)];
+                let nodes = of_edge.entry([low, high]).or_insert_with(|| {
+                    let (first, ends) = (points.len() as u32, [low, high].map(|end| points[end as usize]));
+                    points.extend((0..inside).map(|k| on_chord(ends, k, inside)));
+                    (first..first + inside as u32).collect()
+                });
+                connectivity.extend(turned(nodes, a > b));
+            }
+        }
+        (group.stride, group.connectivity) = (group.stride + edges.len() * inside, connectivity);
+    }
 }
 
 /// The entry of a point that is not a node.

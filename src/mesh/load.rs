@@ -45,14 +45,14 @@ pub enum MeshOrigin {
 
 /// Load the mesh of a scene for displacements of an order, unless a signal ends it.
 ///
-/// Orders above two have the shape of a mesh of order 2. Gmsh meshes a `.geo` script with that order, unless the cache has the result. A mesh file of order 2 serves order 1
-/// without its mid-edge points. Folded quadratic cells become straight ([`Mesh::straightened`]).
+/// Gmsh meshes a `.geo` script with that order, unless the cache has the result. A mesh file of another order serves,
+/// too: without the points inside its edges for order 1, and with straight edges if its own order is 1. Folded cells
+/// become straight ([`Mesh::straightened`]).
 ///
 /// # Errors
 /// A file cannot be read, or the script does not take a number. Gmsh is missing or fails. The mesh is not one of named
 /// simplices in `D` dimensions (see [`parse`](super::parse)), or its order is too low. A signal arrives.
 pub fn load<const D: usize>(source: &MeshSource, order: Order, interrupt: &Interrupt) -> Result<Loaded<D>> {
-    let order = order.of_shape();
     let mut loaded = match source {
         MeshSource::Geo(source) => {
             if let (true, Some((name, _))) = (is_shape(&source.file), source.set.first()) {
@@ -109,8 +109,8 @@ fn from_file<const D: usize>(file: &Located<PathBuf>, order: Order, interrupt: &
         false => read_file(path, path, MeshProducer::User, MeshOrigin::File)?,
     };
     loaded.mesh = match (loaded.mesh.order, order) {
-        (Order::P2, Order::P1) => loaded.mesh.lower_order(),
-        (Order::P1, order) if order > Order::P1 => loaded.mesh.higher_order(),
+        (own, Order::P1) if own > Order::P1 => loaded.mesh.lower_order(),
+        (Order::P1, order) if order > Order::P1 => loaded.mesh.higher_order(Order::P2),
         _ => loaded.mesh,
     };
     Ok(loaded)

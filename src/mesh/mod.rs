@@ -22,6 +22,7 @@ mod msh;
 mod msh2;
 mod scan;
 mod script;
+mod shape;
 mod simplex;
 mod split;
 #[cfg(test)]
@@ -36,12 +37,11 @@ pub use locality::bisect;
 pub use msh::parse;
 pub use script::unstructured;
 pub use script::view;
+pub use shape::{edges, weights};
 pub use simplex::EDGES;
-pub use vertices::is_smooth;
 
 use crate::linalg::{bounds, pad};
 use crate::problem::order::Order;
-use std::collections::HashMap;
 use std::path::PathBuf;
 
 /// Lengths of a mesh that a run computes with. The lengths of atoms and of galaxies lie between 1e-40 and 1e40 in all units in
@@ -50,12 +50,13 @@ pub const LENGTHS: [f64; 2] = [1e-40, 1e40];
 
 /// A mesh: points and named groups of simplices.
 ///
-/// Groups are Gmsh's physical groups. Cells are groups of dimension `D`; surfaces, edges and points have lower dimension. The
-/// local numbering is VTK's: vertices come first. For `Order::P2` mid-edges follow in the order `01` (line), `01 12 02`
-/// (triangle), `01 12 02 03 13 23` (tetrahedron).
+/// Groups are Gmsh's physical groups. Cells are groups of dimension `D`; surfaces, edges and points have lower
+/// dimension. The local numbering is VTK's: vertices come first. The points inside edges follow in the order `01`
+/// (line), `01 12 02` (triangle), `01 12 02 03 13 23` (tetrahedron), those of one edge from its first to its second
+/// end. There are no points inside simplices.
 ///
-/// No simplex is degenerate: its measure is above 1e-12 times its longest edge to the power of its dimension. Cells have
-/// positive volume, group names are unique, no group is empty, and coordinates are finite.
+/// No simplex is degenerate: its measure is above 1e-12 times its longest edge to the power of its dimension. Cells
+/// have positive volume, group names are unique, no group is empty, and coordinates are finite.
 #[derive(Debug, Clone)]
 pub struct Mesh<const D: usize> {
     /// The file that the user named (`.geo` or `.msh`), for messages.
@@ -74,7 +75,7 @@ pub struct Mesh<const D: usize> {
     pub groups: Groups,
     /// Number of quadrangles, hexahedra, prisms and pyramids that were split into simplices.
     pub split: usize,
-    /// Number of quadratic cells whose edges were made straight because the curved boundary folded them.
+    /// Number of curved cells whose edges were made straight because the curved boundary folded them.
     pub straightened: usize,
 }
 
@@ -141,27 +142,11 @@ impl<const D: usize> Mesh<D> {
         Mesh { points, order: Order::P1, groups, path: self.path.clone(), ..*self }
     }
 
-    /// Return the mesh of the same simplices with points in the middles of their edges, which stay straight. The mesh has the order 1.
-    pub fn higher_order(&self) -> Mesh<D> {
+    /// Return the mesh of the same simplices with points inside their edges, which stay straight. The mesh has the
+    /// order 1.
+    pub fn higher_order(&self, order: Order) -> Mesh<D> {
         let (mut points, mut groups) = (self.points.clone(), self.groups.to_vec());
-        let mut middles: HashMap<[u32; 2], u32> = HashMap::new();
-        for group in groups.iter_mut() {
-            let edges = &EDGES[..group.dimension * (group.dimension + 1) / 2];
-            let mut connectivity = Vec::with_capacity(group.len() * (group.stride + edges.len()));
-            for simplex in group.simplices() {
-                connectivity.extend(simplex);
-                for [a, b] in edges.iter().map(|edge| edge.map(|corner| simplex[corner])) {
-                    let middle = *middles.entry([a.min(b), a.max(b)]).or_insert_with(|| {
-                        let [a, b] = [a, b].map(|end| points[end as usize]);
-                        points.push(std::array::from_fn(|c| 0.5 * (a[c] + b[c])));
-                        points.len() as u32 - 1
-                    });
-                    connectivity.push(middle);
-                }
-            }
-            group.stride += edges.len();
-            group.connectivity = connectivity;
-        }
-        Mesh { points, order: Order::P2, groups: groups.into(), path: self.path.clone(), ..*self }
+        groups::raise(&mut groups, &mut points, order, D);
+        Mesh { points, order, groups: groups.into(), path: self.path.clone(), ..*self }
     }
 }

@@ -150,7 +150,12 @@ impl Contents {
             let kind = ElementType::number([&POINT, &LINE, &TRIANGLE][group.dimension], group.stride);
             for simplex in group.simplices() {
                 let number = contents.elements.len() as u64 + 1;
-                contents.elements.push((number, kind, tag, simplex.iter().map(|&node| u64::from(node) + 1).collect()));
+                let mut nodes: Vec<u64> = simplex.iter().map(|&node| u64::from(node) + 1).collect();
+                if group.dimension == 2 {
+                    // Gmsh has the third edge as 20
+                    nodes[2 * mesh.order.degree() + 1..].reverse();
+                }
+                contents.elements.push((number, kind, tag, nodes));
             }
         }
         contents

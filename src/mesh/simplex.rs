@@ -72,9 +72,23 @@ pub const PYRAMID: Shape = Shape {
     faces: &[&[0, 3, 2, 1], &[0, 1, 4], &[1, 2, 4], &[2, 3, 4], &[3, 0, 4]],
 };
 
-/// Numbers of nodes of Gmsh's types of elements in the order of their numbers, which begin with 1.
-const NODES: [usize; 31] =
-    [2, 3, 4, 4, 8, 6, 5, 3, 6, 9, 10, 27, 18, 14, 1, 8, 20, 15, 13, 9, 10, 12, 15, 15, 21, 4, 5, 6, 20, 35, 56];
+/// Number and nodes of Gmsh's types of elements of a shape, from order one on. Where there are types with the nodes of
+/// corners and edges alone, these come first.
+const TYPES: [(&Shape, &[(i32, usize)]); 13] = [
+    (&POINT, &[(POINTS, 1)]),
+    (&LINE, &[(1, 2), (8, 3), (26, 4), (27, 5), (28, 6), (62, 7), (63, 8), (64, 9)]),
+    (&TRIANGLE, &[(2, 3), (9, 6), (20, 9), (22, 12), (24, 15), (52, 18), (53, 21), (54, 24)]),
+    (&TRIANGLE, &[(2, 3), (9, 6), (21, 10), (23, 15), (25, 21), (42, 28), (43, 36), (44, 45)]),
+    (&QUADRANGLE, &[(3, 4), (16, 8), (39, 12), (40, 16), (41, 20), (57, 24), (58, 28), (59, 32)]),
+    (&QUADRANGLE, &[(3, 4), (10, 9), (36, 16), (37, 25), (38, 36), (47, 49), (48, 64), (49, 81)]),
+    (&TETRAHEDRON, &[(4, 4), (11, 10), (29, 20), (30, 35), (31, 56)]),
+    (&HEXAHEDRON, &[(5, 8), (17, 20)]),
+    (&HEXAHEDRON, &[(5, 8), (12, 27)]),
+    (&PRISM, &[(6, 6), (18, 15)]),
+    (&PRISM, &[(6, 6), (13, 18)]),
+    (&PYRAMID, &[(7, 5), (19, 13)]),
+    (&PYRAMID, &[(7, 5), (14, 14)]),
+];
 
 /// Gmsh's number of the type of points.
 pub const POINTS: i32 = 15;
@@ -85,47 +99,27 @@ pub struct ElementType {
     /// Gmsh's number.
     pub number: i32,
     pub shape: &'static Shape,
-    /// Number of nodes: corners, then those of edges, then those of quadrangular faces, then that of the cell.
+    /// Number of nodes: corners, then those of edges, then those of faces, then those of the cell.
     pub nodes: usize,
+    /// The order; points have none.
+    pub order: Option<Order>,
 }
 
 impl ElementType {
     /// Return the type with this number of Gmsh.
     pub fn of(number: i32) -> Option<ElementType> {
-        let nodes = *NODES.get(usize::try_from(number).ok()?.checked_sub(1)?)?;
-        let shape = match number {
-            1 | 8 | 26..=28 => &LINE,
-            2 | 9 | 20..=25 => &TRIANGLE,
-            3 | 10 | 16 => &QUADRANGLE,
-            4 | 11 | 29..=31 => &TETRAHEDRON,
-            5 | 12 | 17 => &HEXAHEDRON,
-            6 | 13 | 18 => &PRISM,
-            7 | 14 | 19 => &PYRAMID,
-            _ => &POINT,
-        };
-        Some(ElementType { number, shape, nodes })
+        TYPES.iter().find_map(|&(shape, types)| {
+            let at = types.iter().position(|kind| kind.0 == number)?;
+            let order = Order::new(at + 1).filter(|_| number != POINTS);
+            Some(ElementType { number, shape, nodes: types[at].1, order })
+        })
     }
 
-    /// Return Gmsh's number of the type with this shape and number of nodes.
+    /// Return Gmsh's number of the type with this shape and number of nodes, all of them on edges if there is such a
+    /// type.
     pub fn number(shape: &Shape, nodes: usize) -> i32 {
-        (1..)
-            .map_while(ElementType::of)
-            .find(|kind| kind.shape == shape && kind.nodes == nodes)
-            .map_or(0, |kind| kind.number)
-    }
-
-    /// Return whether this program computes with it: it is a point, or of order 1 or 2.
-    pub fn is_known(&self) -> bool {
-        self.number < 20
-    }
-
-    /// Return the order of a known type; points have none.
-    pub fn order(&self) -> Option<Order> {
-        match self.number {
-            POINTS => None,
-            ..8 => Some(Order::P1),
-            _ => Some(Order::P2),
-        }
+        let types = TYPES.iter().filter(|(own, _)| *own == shape).flat_map(|(_, types)| types.iter());
+        types.into_iter().find(|kind| kind.1 == nodes).map_or(0, |kind| kind.0)
     }
 
     /// Return whether the elements are no simplices and must be divided.
@@ -133,32 +127,41 @@ impl ElementType {
         !self.shape.faces.is_empty()
     }
 
-    /// Return the number of nodes of a simplex of this dimension and order.
-    pub fn stride(&self) -> usize {
-        let dimension = self.shape.dimension;
-        let edges = if self.order() == Some(Order::P2) { dimension * (dimension + 1) / 2 } else { 0 };
-        dimension + 1 + edges
+    /// Return the number of nodes inside each edge.
+    pub fn inside(&self) -> usize {
+        self.order.map_or(0, |order| order.degree() - 1)
+    }
+
+    /// Reorder the nodes of a simplex from Gmsh's order to ours, without those inside a triangle. Gmsh has the third
+    /// edge of a triangle as 20, and mid-edge 23 before 13 in the quadratic tetrahedron.
+    pub fn reorder(&self, simplex: &mut Vec<u32>) {
+        simplex.truncate(stride(self.shape.dimension, self.order));
+        match (self.shape.dimension, self.order) {
+            (2, Some(order)) => simplex[2 * order.degree() + 1..].reverse(),
+            (3, Some(Order::P2)) => simplex.swap(8, 9),
+            _ => {}
+        }
     }
 }
 
-/// Reorder the points of a simplex from Gmsh's order to ours. They differ only in the quadratic tetrahedron, where Gmsh has
-/// mid-edge 23 before 13.
-pub fn from_gmsh_order(simplex: &mut [u32]) {
-    if simplex.len() == 10 {
-        simplex.swap(8, 9);
-    }
+/// Return the number of points of a simplex: its vertices and those inside its edges.
+pub fn stride(dimension: usize, order: Option<Order>) -> usize {
+    let inside = order.map_or(0, |order| order.degree() - 1);
+    dimension + 1 + dimension * (dimension + 1) / 2 * inside
 }
 
-/// Invert the orientation of a cell: exchange its last two vertices and the mid-edges that go with them.
+/// Invert the orientation of a cell: exchange its last two vertices and the points of edges that go with them.
 fn mirror(cell: &mut [u32]) {
-    let swaps: &[(usize, usize)] = match cell.len() {
-        3 => &[(1, 2)],
-        4 => &[(2, 3)],
-        6 => &[(1, 2), (3, 5)],
-        10 => &[(2, 3), (5, 8), (6, 7)],
-        _ => &[],
-    };
-    swaps.iter().for_each(|&(a, b)| cell.swap(a, b));
+    match cell.len() {
+        4 => cell.swap(2, 3),
+        10 => [(2, 3), (5, 8), (6, 7)].into_iter().for_each(|(a, b)| cell.swap(a, b)),
+        points => {
+            let degree = points / 3;
+            cell.swap(1, 2);
+            (3..degree + 2).for_each(|at| cell.swap(at, at + 2 * (degree - 1)));
+            cell[degree + 2..2 * degree + 1].reverse();
+        }
+    }
 }
 
 /// Turn a simplex to positive volume if it is a cell of `space`. Return `false` if it has no extent.

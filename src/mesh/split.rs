@@ -1,15 +1,17 @@
 //! The division of quadrangles, hexahedra, prisms and pyramids into triangles and tetrahedra.
 //!
-//! Every cell is the cone from its vertex with the smallest number over the faces without that vertex. A quadrangle is the cone
-//! from its smallest vertex over the edges without it. The diagonal of a quadrangle therefore depends on the numbers of its
-//! vertices alone, so that cells of any kind agree on common faces.
+//! Every cell is the cone from its vertex with the smallest number over the faces without that vertex. A quadrangle is
+//! the cone from its smallest vertex over the edges without it. The diagonal of a quadrangle therefore depends on the
+//! numbers of its vertices alone, so that cells of any kind agree on common faces.
 //!
-//! Quadratic cells get nodes in the middle of the diagonals. A diagonal of a face has its node where the map of the face takes the
-//! centre of the reference square, and a diagonal through a cell where the map of the cell takes the centre of the reference cube.
-//! The boundary of the simplices is thus interpolated from that of the cells.
+//! Cells of higher orders get nodes on the diagonals. A diagonal of a face has them where the map that blends the edges
+//! of the face takes the diagonal of the reference square, and a diagonal through a quadratic cell has one where the map
+//! of the cell takes the centre of the reference cube. The boundary of the simplices is thus interpolated from that of
+//! the cells.
 
+use super::shape::turned;
 use super::simplex::{EDGES, ElementType, QUADRANGLE, Shape};
-use crate::problem::order::Order;
+use smallvec::SmallVec;
 use std::collections::HashMap;
 
 /// Return the quadrangular faces of a shape. A quadrangle has one, itself.
@@ -43,16 +45,13 @@ fn cone(cell: &[u32], faces: &[Vec<u32>]) -> Vec<Vec<u32>> {
     simplices
 }
 
-/// The vertices of a hexahedron.
-const CELL: [usize; 8] = [0, 1, 2, 3, 4, 5, 6, 7];
-
 /// The maker of the nodes in the middle of diagonals. Faces are known by their vertices, so that all cells and facets at a face
 /// share its node. So do copies of a cell in several groups.
 pub struct Middles<'a> {
     /// Coordinates of all points, to which new ones are appended.
     pub points: &'a mut Vec<[f64; 3]>,
-    /// The node of each divided face by its sorted vertices, and of each divided hexahedron by the ends of its diagonal, each
-    /// twice.
+    /// The first node of each divided face by its sorted vertices, and of each divided hexahedron by the ends of its
+    /// diagonal, each twice. Further ones follow, from the end with the smaller number.
     pub known: &'a mut HashMap<[u32; 4], u32>,
 }
 
@@ -61,57 +60,77 @@ impl Middles<'_> {
     pub fn simplices(&mut self, kind: ElementType, cell: &[u32]) -> Vec<u32> {
         let Shape { dimension, .. } = *kind.shape;
         let vertices = divided(kind.shape, cell);
-        if kind.order() == Some(Order::P1) {
+        if kind.inside() == 0 {
             return vertices;
         }
         let mut simplices = Vec::new();
         for simplex in vertices.chunks_exact(dimension + 1) {
             simplices.extend_from_slice(simplex);
             for [a, b] in &EDGES[..dimension * (dimension + 1) / 2] {
-                simplices.push(self.middle(kind.shape, cell, [simplex[*a], simplex[*b]]));
+                simplices.extend(self.inside(kind, cell, [simplex[*a], simplex[*b]]));
             }
         }
         simplices
     }
 
-    /// Return the node in the middle between two vertices of a quadratic cell with the nodes `cell`.
+    /// Return the nodes between two vertices of a cell with the nodes `cell`, from the first to the second one.
     ///
     /// Edges come first, since a diagonal of a face is an edge of the cell where another edge of the face was drawn into a
     /// point. For the same reason faces come before the cell.
-    fn middle(&mut self, shape: &Shape, cell: &[u32], ends: [u32; 2]) -> u32 {
-        let is_edge = |[a, b]: &[usize; 2]| [[cell[*a], cell[*b]], [cell[*b], cell[*a]]].contains(&ends);
-        if let Some(edge) = shape.edges.iter().position(is_edge) {
-            return cell[shape.corners + edge];
+    fn inside(&mut self, kind: ElementType, cell: &[u32], ends: [u32; 2]) -> SmallVec<[u32; 2]> {
+        let (shape, count) = (kind.shape, kind.inside() as u32);
+        if let Some(nodes) = on_edge(kind, cell, ends) {
+            return nodes;
         }
         let in_middle = shape.corners + shape.edges.len();
         let has_ends = |face: &&[usize]| ends.iter().all(|end| face.iter().any(|at| cell[*at] == *end));
-        let (key, vertices, given) = match quadrangles(shape).enumerate().find(|(_, face)| has_ends(face)) {
-            Some((number, face)) => ([0, 1, 2, 3].map(|at| cell[face[at]]), face, cell.get(in_middle + number)),
-            None => ([ends[0], ends[0], ends[1], ends[1]], &CELL[..], cell[in_middle..].last()),
+        let (mut key, face, given) = match quadrangles(shape).enumerate().find(|(_, face)| has_ends(face)) {
+            Some((number, face)) => ([0, 1, 2, 3].map(|at| cell[face[at]]), Some(face), cell.get(in_middle + number)),
+            None => ([ends[0], ends[0], ends[1], ends[1]], None, cell[in_middle..].last()),
         };
-        let mut key = key;
         key.sort_unstable();
-        let known = self.known.get(&key).or(given).copied();
-        let middle = known.unwrap_or_else(|| self.make(shape, cell, vertices));
-        self.known.insert(key, middle);
-        middle
+        let known = self.known.get(&key).or(given.filter(|_| count == 1)).copied();
+        let first = known.unwrap_or_else(|| {
+            let first = self.points.len() as u32;
+            for k in 0..count as usize {
+                let terms = face.map_or_else(|| in_centre(shape, cell), |face| on_face(kind, cell, face, ends, k));
+                let sum = |c| terms.iter().map(|&(weight, node)| weight * self.points[node as usize][c]).sum();
+                let place = std::array::from_fn(sum);
+                self.points.push(place);
+            }
+            first
+        });
+        self.known.insert(key, first);
+        turned(&(first..first + count).collect::<Vec<_>>(), ends[0] > ends[1])
     }
+}
 
-    /// Make the node in the centre of a face of a cell, or of a hexahedron, given by its vertices.
-    ///
-    /// In the centre the function of each vertex is -1/4. Those of the mid-edge nodes are equal and make the sum one: they are
-    /// 1/2 on a face of four edges and 1/4 in a hexahedron of twelve.
-    fn make(&mut self, shape: &Shape, cell: &[u32], vertices: &[usize]) -> u32 {
-        let edges = shape.edges.iter().zip(&cell[shape.corners..]);
-        let middles = edges.filter(|(ends, _)| ends.iter().all(|end| vertices.contains(end))).map(|(_, middle)| middle);
-        let sum = |nodes: &mut dyn Iterator<Item = &u32>| {
-            nodes.fold([0.0; 3], |sum, node| std::array::from_fn(|c| sum[c] + self.points[*node as usize][c]))
-        };
-        let (corners, middles) = (sum(&mut vertices.iter().map(|at| &cell[*at])), sum(&mut middles.into_iter()));
-        let weight = if vertices.len() == 4 { 0.5 } else { 0.25 };
-        self.points.push(std::array::from_fn(|c| weight * middles[c] - 0.25 * corners[c]));
-        (self.points.len() - 1) as u32
-    }
+/// Return the nodes inside an edge of a cell from its first to its second end, if the ends belong to an edge.
+fn on_edge(kind: ElementType, cell: &[u32], ends: [u32; 2]) -> Option<SmallVec<[u32; 2]>> {
+    let of_edge = |[a, b]: [usize; 2]| [cell[a], cell[b]];
+    let is_edge = |edge: &[usize; 2]| [ends, [ends[1], ends[0]]].contains(&of_edge(*edge));
+    let (edge, count) = (kind.shape.edges.iter().position(is_edge)?, kind.inside());
+    let nodes = &cell[kind.shape.corners + edge * count..][..count];
+    Some(turned(nodes, of_edge(kind.shape.edges[edge]) != ends))
+}
+
+/// Return the weights of nodes in point `k` of the diagonal of a face, from its end with the smaller number: where the
+/// map that blends the edges takes the diagonal of the reference square. In the centre they are -1/4 of each vertex
+/// and 1/2 of each mid-edge node.
+fn on_face(kind: ElementType, cell: &[u32], face: &[usize], ends: [u32; 2], k: usize) -> Vec<(f64, u32)> {
+    let from = face.iter().position(|&at| cell[at] == ends[0].min(ends[1])).unwrap_or(0);
+    let [a, b, c, d] = [0, 1, 2, 3].map(|i| cell[face[(from + i) % 4]]);
+    let s = (k + 1) as f64 / (kind.inside() + 1) as f64;
+    let edges = [(1.0 - s, [a, b]), (s, [b, c]), (1.0 - s, [a, d]), (s, [d, c])];
+    let on_edges = edges.into_iter().filter_map(|(weight, ends)| Some((weight, on_edge(kind, cell, ends)?[k])));
+    let at_vertices = [((1.0 - s) * (s - 1.0), a), (s * (s - 1.0), b), (-s * s, c), (s * (s - 1.0), d)];
+    on_edges.chain(at_vertices).collect()
+}
+
+/// Return the weights of the nodes of a quadratic hexahedron in its centre.
+fn in_centre(shape: &Shape, cell: &[u32]) -> Vec<(f64, u32)> {
+    let weight = |at: usize| if at < shape.corners { -0.25 } else { 0.25 };
+    (0..shape.corners + shape.edges.len()).map(|at| (weight(at), cell[at])).collect()
 }
 
 #[cfg(test)]

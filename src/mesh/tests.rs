@@ -4,7 +4,7 @@ mod mutations;
 
 use super::cache::Cache;
 use super::load::{Meshing, load};
-use super::{Group, Loaded, Mesh, MeshOrigin, MeshProducer, msh, simplex, view};
+use super::{Asked, Duty, Group, Loaded, Mesh, MeshOrigin, MeshProducer, msh, shape, simplex, view};
 use crate::error::{Located, Place, Result, Source};
 use crate::interrupt::Interrupt;
 use crate::problem::mesh::{AdaptedMesh, MeshSource};
@@ -100,19 +100,22 @@ fn extent<const D: usize>(mesh: &Mesh<D>, group: &Group) -> f64 {
         .sum()
 }
 
-/// Assert that groups have these measures, and that every mid-edge point of a straight mesh lies between its two vertices.
+/// Assert that groups have these measures, and that the points inside the edges of a straight mesh divide them into
+/// equal parts.
 fn assert_sizes<const D: usize>(mesh: &Mesh<D>, sizes: &[(&str, f64)]) {
     for (name, expected) in sizes {
         let size = extent(mesh, mesh.group(name).unwrap());
         assert!((size - expected).abs() < 1e-9, "{name}: {size}");
     }
-    for group in mesh.groups.iter().filter(|group| group.dimension > 0 && mesh.order == Order::P2) {
+    let at = |point: u32| mesh.points[point as usize];
+    for group in mesh.groups.iter().filter(|group| group.dimension > 0) {
         for simplex in group.simplices() {
-            let middles = &simplex[group.dimension + 1..];
-            assert_eq!(middles.len(), [0, 1, 3, 6][group.dimension]);
-            for (middle, [a, b]) in middles.iter().zip(simplex::EDGES) {
-                let [x, y, m] = [simplex[a], simplex[b], *middle].map(|point| mesh.points[point as usize]);
-                assert!((0..D).all(|k| (m[k] - 0.5 * (x[k] + y[k])).abs() < 1e-9), "{middle} of `{}`", group.name);
+            assert_eq!(simplex.len(), simplex::stride(group.dimension, Some(mesh.order)));
+            for (ends, inside) in shape::edges(simplex, group.dimension) {
+                for (k, &point) in inside.iter().enumerate() {
+                    let straight = shape::on_chord(ends.map(|end| at(simplex[end])), k, inside.len());
+                    assert!((0..D).all(|c| (at(point)[c] - straight[c]).abs() < 1e-9), "{point} of `{}`", group.name);
+                }
             }
         }
     }
@@ -120,7 +123,7 @@ fn assert_sizes<const D: usize>(mesh: &Mesh<D>, sizes: &[(&str, f64)]) {
 
 #[test]
 fn squares_of_both_forms_and_orders() {
-    for order in ["1", "2"] {
+    for order in ["1", "2", "3", "4", "5", "6", "7", "8"] {
         let [text, binary] = [&[][..], &["-bin"]].map(|form| {
             let mesh: Mesh<2> = parse(&gmsh(SQUARE, &[&["-2", "-order", order], form].concat())).unwrap();
             mesh
@@ -132,7 +135,8 @@ fn squares_of_both_forms_and_orders() {
                 ["soft rock", "steel", "left", "outside", "corner"].map(|name| mesh.group(name).unwrap().len());
             assert_eq!(counts, [8, 8, 2, 12, 1]);
             assert_eq!(mesh.group_names(2).collect::<Vec<_>>(), ["soft_rock", "steel"]);
-            assert_eq!(mesh.points.len(), if order == "1" { 15 } else { 45 });
+            assert_eq!(mesh.points.len(), 15 + 30 * (mesh.order.degree() - 1));
+            assert_eq!(mesh.order.degree().to_string(), order);
             // Each cell is positive, although one surface is drawn clockwise.
             assert_sizes(mesh, &[("soft rock", 0.5), ("steel", 1.5), ("left", 1.0), ("outside", 4.0)]);
             let corner = mesh.group("corner").unwrap().connectivity[0];
@@ -161,6 +165,48 @@ fn cubes_of_both_forms_and_orders() {
     }
 }
 
+/// A quarter of a ring, of triangles or of quadrangles that are divided: the points of both arcs lie on them, equally
+/// spaced, and the cells fit.
+#[test]
+fn arcs_of_all_orders() {
+    const RING: &str = "For i In {1:2}\n Point(i) = {i, 0, 0}; Point(i + 2) = {0, i, 0};\nEndFor\nPoint(5) = {0, 0, 0};\n\
+                        Circle(1) = {1, 5, 3}; Circle(2) = {2, 5, 4}; Line(3) = {1, 2}; Line(4) = {3, 4};\n\
+                        Curve Loop(1) = {3, 2, -4, -1}; Plane Surface(1) = {1};\n\
+                        Transfinite Curve {1, 2} = 4; Transfinite Curve {3, 4} = 2;\n\
+                        Physical Surface(\"ring\") = {1}; Physical Curve(\"bore\") = {1}; Physical Curve(\"rim\") = {2};\n";
+    let quadrangles = "Transfinite Surface {1}; Recombine Surface {1};\n";
+    for degree in 2..=8 {
+        for (script, options) in [
+            (RING.to_owned(), &[][..]),
+            (format!("{RING}{quadrangles}"), &[]),
+            (format!("{RING}{quadrangles}"), &["-setnumber", "Mesh.SecondOrderIncomplete", "1"]),
+        ] {
+            let order = degree.to_string();
+            let arguments = [&["-2", "-order", &order], options].concat();
+            let mut mesh: Mesh<2> = parse(&gmsh(&script, &arguments)).unwrap();
+            assert_eq!((mesh.order.degree(), mesh.split > 0), (degree, script.contains("Recombine")));
+            let groups = vec![("bore", Duty::Acts), ("rim", Duty::Acts)];
+            mesh.check(&[Asked { name: "ring", order: mesh.order, groups }], &[], false).unwrap();
+            mesh.straighten();
+            assert_eq!(mesh.straightened, 0, "{degree} {options:?}");
+            for (name, radius) in [("bore", 1.0), ("rim", 2.0)] {
+                for edge in mesh.group(name).unwrap().simplices() {
+                    let row: Vec<u32> = [&edge[..1], &edge[2..], &edge[1..2]].concat();
+                    let angle = |point: &u32| {
+                        let [x, y] = mesh.points[*point as usize];
+                        assert!((x.hypot(y) - radius).abs() < 1e-12);
+                        y.atan2(x)
+                    };
+                    let steps: Vec<f64> =
+                        row.windows(2).map(|ends| (angle(&ends[1]) - angle(&ends[0])).abs()).collect();
+                    let equal = std::f64::consts::FRAC_PI_6 / degree as f64;
+                    assert!(steps.iter().all(|step| (step - equal).abs() < 1e-6), "{degree}: {steps:?}");
+                }
+            }
+        }
+    }
+}
+
 fn message(bytes: &[u8]) -> String {
     parse::<2>(bytes).map(|_| ()).expect_err("this mesh is bad").to_string()
 }
@@ -171,7 +217,7 @@ fn bad_meshes_are_refused_by_name_and_line() {
     for (bytes, expected) in [
         (square("", &["-2", "-format", "msh40"]), "a.msh:2: this is version 4 of the mesh format"),
         (square("", &["-2", "-format", "msh1"]), "a.msh:1: this is not a mesh file of Gmsh"),
-        (square("", &["-2", "-order", "3"]), "elements of 4 nodes (Gmsh's type 26)"),
+        (square("", &["-2", "-order", "9"]), "elements of Gmsh's type 65 cannot be used"),
         (square("Physical Curve(77) = {3};", &["-2"]), "physical curve 77 has no name"),
         (square("Physical Curve(\"gone\") = {99};", &["-2"]), "the physical curve `gone` has no elements"),
         (square("Physical Curve(\"steel\") = {7};", &["-2"]), "two physical groups are named `steel`"),
@@ -322,13 +368,14 @@ fn an_adapted_mesh_has_vertices_where_they_are_asked() {
     let folder = tempfile::tempdir().unwrap();
     let (cache, geo) = (folder.path().join("cache"), folder.path().join("square.geo"));
     std::fs::write(&geo, SQUARE).unwrap();
-    let free = meshed::<2>(&geo, &[], Order::P2, &cache).unwrap().mesh;
+    let order = Order::new(4).unwrap();
+    let free = meshed::<2>(&geo, &[], order, &cache).unwrap().mesh;
     let place = [0.6137, 0.0, 0.0];
     let corners = [[-9.0, -9.0, 0.0], [9.0, -9.0, 0.0], [0.0, 9.0, 0.0]];
     let adapted = AdaptedMesh { sizes: view(3, &corners, &[0.1; 3]), vertices: vec![place, [0.27, 0.0, 0.0]] };
     for origin in [MeshOrigin::Gmsh, MeshOrigin::Cache] {
-        let loaded = meshed_with::<2>(&geo, &[], Order::P2, (Some(&adapted), &Guard::default()), &cache).unwrap();
-        assert_eq!(loaded.origin, origin);
+        let loaded = meshed_with::<2>(&geo, &[], order, (Some(&adapted), &Guard::default()), &cache).unwrap();
+        assert_eq!((loaded.origin, loaded.mesh.order), (origin, order));
         assert!(loaded.mesh.points.iter().any(|x| (x[0] - place[0]).abs() < 1e-12 && x[1] == 0.0));
         assert!(loaded.mesh.points.contains(&[0.25, 0.0]), "the materials meet where they did");
         let names = |mesh: &Mesh<2>| mesh.groups.iter().map(|group| group.name.clone()).collect::<Vec<_>>();

@@ -84,7 +84,7 @@ impl BodySpec {
         Self { split: true, ..self }
     }
 
-    /// Set the order of the elements. Orders above one take their shape from a mesh of order two.
+    /// Set the order of the elements, in which a script is meshed, too.
     pub fn order(self, order: Order) -> Self {
         Self { order, ..self }
     }

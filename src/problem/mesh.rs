@@ -257,8 +257,9 @@ pub struct GroupArrays {
     pub name: String,
     /// Dimension of the simplices: 0 points, 1 lines, 2 triangles, 3 tetrahedra.
     pub dimension: usize,
-    /// Point numbers from 0, simplex by simplex. Corners come first. For order 2, mid-edge points follow in VTK's order: 01 for a line,
-    /// 01 12 02 for a triangle, 01 12 02 03 13 23 for a tetrahedron.
+    /// Point numbers from 0, simplex by simplex. Corners come first. The points inside edges follow in VTK's order of edges: 01
+    /// for a line, 01 12 02 for a triangle, 01 12 02 03 13 23 for a tetrahedron. Those of one edge divide it into k parts
+    /// from its first to its second end. The order k is at most 2 in space.
     pub connectivity: Vec<u32>,
 }
 

@@ -23,14 +23,14 @@ impl Order {
         (1..=Self::HIGHEST).contains(&degree).then_some(Self(degree as u8))
     }
 
+    /// Return the highest order of bodies of a dimension.
+    pub fn highest(dimension: usize) -> Self {
+        if dimension == 2 { Self(Self::HIGHEST as u8) } else { Self::P2 }
+    }
+
     /// Return the polynomial degree.
     pub fn degree(self) -> usize {
         usize::from(self.0)
-    }
-
-    /// Return the order of the mesh that gives bodies of this order their shape: 1 or 2.
-    pub fn of_shape(self) -> Self {
-        self.min(Self::P2)
     }
 }
 

@@ -45,10 +45,10 @@ pub fn in_parts(split: usize) -> Option<String> {
     (split > 0).then(|| format!("{split} {what}"))
 }
 
-/// Return the warning of quadratic cells that were made straight, if any.
+/// Return the warning of curved cells that were made straight, if any.
 pub fn made_straight(cells: usize) -> Option<String> {
     let why = "were folded by the curved boundary and have straight edges now, so that gaps there are those of chords: a finer mesh follows the boundary";
-    (cells > 0).then(|| format!("{cells} quadratic cells {why}"))
+    (cells > 0).then(|| format!("{cells} curved cells {why}"))
 }
 
 /// Return the warnings of motions that nothing resists: one for all bodies that have the same one, each for itself.

@@ -208,7 +208,8 @@ fn facets_before_a_hole_lose_nothing() {
     }
 }
 
-/// A wave of the mesh and one of the gap before a flat mesh give the same pressures with elements of high order, whose edges have the order two.
+/// A wave of the mesh and one of the gap before a flat mesh give the same pressures with elements of high order, whose
+/// edges have their order.
 #[test]
 fn a_wave_of_the_mesh_is_one_of_the_gap() {
     let pressures = |order: usize, sets: &[&str]| {

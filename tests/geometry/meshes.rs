@@ -161,7 +161,7 @@ fn folded_cells_become_straight() {
     std::fs::write(scene.path.with_file_name("ring.geo"), RINGS).expect("a file");
     let with = |h: &str| solve(&scene, &["--set", &format!("mesh={{geo=\"ring.geo\",set={{h={h}}}}}")]).converged();
     let coarse = with("0.5");
-    assert!(coarse.warnings().contains("8 quadratic cells were folded"), "{}", coarse.warnings());
+    assert!(coarse.warnings().contains("8 curved cells were folded"), "{}", coarse.warnings());
     let fine = with("0.2");
     assert!(!fine.warnings().contains("folded"), "{}", fine.warnings());
     let two = solve_on(2, &scene, &["--set", "mesh={geo=\"ring.geo\",set={h=0.5}}"]).converged();

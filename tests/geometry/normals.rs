@@ -189,3 +189,30 @@ spring = [{{ on = \"skin\", stiffness = 1e-4 }}]
     }
     assert!((peaks[0] / peaks[1] - 1.0).abs() < 1e-6, "{peaks:?}");
 }
+
+/// Blocks with arcs of the radii 60 and 40, whose edges of 5e-5 turn by a millionth. A shift along the arcs changes no pressure, since the normals of both
+/// sides are mixed by their curvatures. Differences of tangents, of which rounding is a hundredth here, would change it by 4 per cent.
+#[test]
+fn curvatures_of_tiny_edges() {
+    let script = "For s In {0:1}\n up = 2*s - 1; R = 60 - 20*s; p = 10*s + 1;\n For i In {0:1}\n\
+        x = 1 + i/1000; y = up*(Sqrt(R*R - 1) - Sqrt(R*R - x*x)); Point(p + i) = {x, y, 0}; Point(p + 2 + i) = {x, y + up/2000, 0};\n EndFor\n\
+        Point(p + 4) = {0, up*Sqrt(R*R - 1), 0}; Circle(p) = {p, p + 4, p + 1};\n\
+        Line(p + 1) = {p + 1, p + 3}; Line(p + 2) = {p + 3, p + 2}; Line(p + 3) = {p + 2, p};\n\
+        Transfinite Curve {p, p + 2} = 21; Transfinite Curve {p + 1, p + 3} = 3;\n\
+        Curve Loop(p) = {p:p + 3}; Plane Surface(p) = {p}; Transfinite Surface {p};\nEndFor\n\
+        Physical Surface(\"lower\") = {1}; Physical Curve(\"top\") = {1}; Physical Curve(\"foot\") = {3};\n\
+        Physical Surface(\"upper\") = {11}; Physical Curve(\"sole\") = {11}; Physical Curve(\"head\") = {13};\n";
+    let body = |name: &str, fix: &str| {
+        format!("[[body]]\nname = \"{name}\"\nyoung = 1e6\npoisson = 0.3\norder = 8\nfix = [{{ on = {fix} }}]\n")
+    };
+    let scene = Scene::new(format!(
+        "dimension = 2\nmesh = {{ geo = \"arcs.geo\" }}\n{}{}[[contact]]\nbetween = [\"top\", \"sole\"]\ntouching = true\n\
+         layer = {{ linear = {{ stiffness = 1 }} }}\n[output]\nvtu = false\nplots = false\n",
+        body("lower", "\"foot\", x = 0, y = 0"),
+        body("upper", "\"head\", x = 1e-4, y = -1e-5")
+    ));
+    fs::write(scene.path.with_file_name("arcs.geo"), script).expect("a script");
+    let table = solve_here(scene, &["method.stop.residual=1e-6"]).converged().contact();
+    let worst = table["pressure"].iter().map(|p| (p / 1e-5 - 1.0).abs()).fold(0.0, f64::max);
+    assert!(worst < 3e-3, "{worst:e}");
+}

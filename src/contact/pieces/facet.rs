@@ -3,7 +3,7 @@
 
 use crate::contact::side::Side;
 use crate::fem::{area_vector, element, length, minus, unit};
-use crate::linalg::dot;
+use crate::linalg::{axpy, dot};
 use crate::problem::order::Order;
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTreeObject, SelectionFunction};
@@ -47,8 +47,8 @@ pub(super) struct Facet<const D: usize> {
 
 impl<const D: usize> Facet<D> {
     pub fn of(side: &Side<D>, i: usize) -> Self {
-        let (order, on) = (side.facets.order.of_shape(), side.on_facet(i));
-        let mut x = side.facets.shape(i, side.space);
+        let (order, on) = (side.facets.order, side.on_facet(i));
+        let mut x = side.facets.coordinates(i, side.space);
         let from = x[0];
         x.iter_mut().for_each(|x| *x = minus(*x, from));
         Self {
@@ -61,8 +61,20 @@ impl<const D: usize> Facet<D> {
         }
     }
 
+    /// Return the point of the facet with barycentric coordinates `l`. An edge of an order above two goes on along its
+    /// tangents beyond its ends, where its polynomial would amplify rounding.
     pub fn at(&self, l: &[f64; D]) -> [f64; D] {
-        element::interpolate(&self.x, &element::values(self.order, l))
+        let on_facet = self.nearest(l);
+        let mut x = element::interpolate(&self.x, &element::values(self.order, &on_facet));
+        if on_facet[1] != l[1] {
+            axpy(l[1] - on_facet[1], &self.tangent(0, l), &mut x);
+        }
+        x
+    }
+
+    /// Return the coordinates of the nearest point on an edge of an order above two. Other facets go on as polynomials.
+    fn nearest(&self, l: &[f64; D]) -> [f64; D] {
+        if self.order <= Order::P2 { *l } else { l.map(|l| l.clamp(0.0, 1.0)) }
     }
 
     pub fn normal(&self, l: &[f64; D]) -> [f64; D] {
@@ -72,13 +84,14 @@ impl<const D: usize> Facet<D> {
     /// Return a bound of the sum of the sizes of the terms that [`Facet::at`] adds.
     fn terms(&self, l: &[f64; D]) -> f64 {
         let reach = 1.0 + 2.0 * l[1..].iter().map(|l| l.abs()).sum::<f64>();
-        // The quadratic functions, l (2l - 1) and 4 l m for barycentric coordinates l and m, sum to less than 3 reach^2 in size.
+        // The quadratic functions, l (2l - 1) and 4 l m for barycentric coordinates l and m, sum to less than 3 reach^2 in size, those of higher
+        // orders to less than 2.3 on their edge, along which tangents are near its size.
         self.size * if self.order == Order::P1 { reach } else { 3.0 * reach * reach }
     }
 
     /// Return the derivative of x by the barycentric coordinate l[k + 1]. When that coordinate grows, l[0] becomes smaller by as much.
     pub fn tangent(&self, k: usize, l: &[f64; D]) -> [f64; D] {
-        element::tangent(self.order, &self.x, l, k)
+        element::tangent(self.order, &self.x, &self.nearest(l), k)
     }
 
     /// Return where the line x + t n meets the surface, as barycentric coordinates and t, at most `beside` outside of the facet; `None` if it

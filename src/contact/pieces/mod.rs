@@ -12,7 +12,6 @@ mod space;
 pub use plane::in_plane;
 pub use space::in_space;
 
-use super::curve::Heights;
 use super::side::Side;
 use crate::fem::{area_vector, element, length, minus};
 use crate::linalg::{around, dot};
@@ -35,7 +34,7 @@ pub struct IntegrationPoint<const D: usize> {
     pub at_b: [f64; D],
     /// Length (area) that belongs to the point, measured on side a; in bodies of revolution the area of a ring.
     pub weight: f64,
-    /// Distance to the projection less the heights of both curves above their edges, negative where the surfaces overlap.
+    /// Distance to the projection, negative where the surfaces overlap.
     pub gap: f64,
 }
 
@@ -46,8 +45,6 @@ pub struct Intersection<const D: usize> {
     pub points: Vec<IntegrationPoint<D>>,
     /// What was refused before each facet of side a.
     pub refused: Vec<Refused>,
-    /// Heights of both curves above their edges, by which the gaps are smaller than the distances of the edges.
-    pub heights: [Heights<D>; 2],
 }
 
 impl<const D: usize> Intersection<D> {
@@ -77,13 +74,12 @@ impl<const D: usize> Intersection<D> {
                 points.push(IntegrationPoint { facet_a: facet, at_a: at, facet_b: facet, at_b: at, weight, gap: 0.0 });
             }
         }
-        Self { points, refused: vec![Refused::default(); a.facets.count()], heights: Default::default() }
+        Self { points, refused: vec![Refused::default(); a.facets.count()] }
     }
 
     /// Take the surfaces as touching everywhere.
     pub fn close(&mut self) {
         self.points.iter_mut().for_each(|point| point.gap = 0.0);
-        self.heights = Default::default();
     }
 }
 

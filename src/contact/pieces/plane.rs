@@ -2,7 +2,6 @@
 
 use super::facet::{Facet, Lost, Rays, SNAP, plus};
 use super::{BoxTree, IntegrationPoint, Intersection, Reach, Refused};
-use crate::contact::curve::Heights;
 use crate::contact::side::Side;
 use crate::fem::{element, length, minus};
 use crate::linalg::dot;
@@ -16,11 +15,7 @@ pub fn in_plane(a: &Side<2>, b: &Side<2>, reach: &Reach) -> Intersection<2> {
     let search = BoxTree::new(b);
     // products of functions of both sides, and one degree more for curved facets
     let rule = element::gauss((a.facets.order.degree() + b.facets.order.degree() + 3) / 2 + 1);
-    let mut common = Intersection {
-        points: Vec::new(),
-        refused: vec![Refused::default(); a.facets.count()],
-        heights: Heights::of_both(a, b),
-    };
+    let mut common = Intersection { points: Vec::new(), refused: vec![Refused::default(); a.facets.count()] };
     for i in 0..a.facets.count() {
         let facet = Facet::of(a, i);
         let refused = &mut common.refused[i];
@@ -40,8 +35,6 @@ pub fn in_plane(a: &Side<2>, b: &Side<2>, reach: &Reach) -> Intersection<2> {
                     refused.far.insert(*index);
                     continue;
                 }
-                let [on_curve_a, on_curve_b] = &common.heights;
-                let height = on_curve_a.at(i, &place(s)) + on_curve_b.at(*index, &at_b);
                 common.points.push(IntegrationPoint {
                     facet_a: i,
                     at_a: place(s),
@@ -51,7 +44,7 @@ pub fn in_plane(a: &Side<2>, b: &Side<2>, reach: &Reach) -> Intersection<2> {
                         * (high - low)
                         * length(facet.tangent(0, &place(s)))
                         * a.space.circle(&plus(on_a, facet.from)),
-                    gap: gap - height,
+                    gap,
                 });
             }
         }

@@ -1,6 +1,7 @@
 //! The boundary of a body: a node that lies on a facet without belonging to it leaves a crack.
 //!
-//! Coincident nodes are a crack with two sets of nodes, other ones are hanging nodes. Quadratic facets count as their flat pieces between nodes.
+//! Coincident nodes are a crack with two sets of nodes, other ones are hanging nodes. Curved facets count as their flat
+//! pieces between nodes.
 
 use super::faces::Cells;
 use crate::error::Result;
@@ -15,9 +16,9 @@ type Point = [f64; 3];
 /// Distance from a facet, as a share of its size, within which a node touches it.
 const TOUCH: f64 = 1e-9;
 
-/// Local nodes of the flat pieces of a facet: a segment or a triangle, or two or four of them between the nodes of a quadratic facet.
-const PIECES: [[&[[usize; 3]]; 2]; 2] =
-    [[&[[0, 1, 1]], &[[0, 2, 2], [2, 1, 1]]], [&[[0, 1, 2]], &[[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]]];
+/// Local nodes of the flat pieces of a facet in space: a triangle, or four of them between the nodes of a quadratic
+/// facet.
+const PIECES: [&[[usize; 3]]; 2] = [&[[0, 1, 2]], &[[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]];
 
 /// Check that no node of the boundary lies on a facet to which it does not belong. `facets` are those of one cell alone.
 ///
@@ -63,14 +64,17 @@ const HANGING: (&str, &str) = (
     "cells must share whole facets: mesh the body in one piece (in the script: `Coherence;`)",
 );
 
-/// Return the distance of a point from a facet.
+/// Return the distance of a point from a facet, whose ends come before the nodes between them.
 fn distance<const D: usize>(cells: &Cells<D>, facet: &[u32], x: Point) -> f64 {
-    let pieces = PIECES[D - 2][usize::from(cells.is_quadratic())];
-    let of_piece = |piece: &[usize; 3]| {
-        let [a, b, c] = piece.map(|at| cells.at(facet[at]));
-        if D == 2 { from_segment(x, a, b) } else { from_triangle(x, [a, b, c]) }
+    let at = |node: u32| cells.at(node);
+    let distances: Vec<f64> = if D == 2 {
+        let row = [&facet[..1], &facet[2..], &facet[1..2]].concat();
+        row.windows(2).map(|ends| from_segment(x, at(ends[0]), at(ends[1]))).collect()
+    } else {
+        let pieces = PIECES[usize::from(cells.is_curved())];
+        pieces.iter().map(|piece| from_triangle(x, piece.map(|corner| at(facet[corner])))).collect()
     };
-    pieces.iter().map(of_piece).fold(f64::INFINITY, f64::min)
+    distances.into_iter().fold(f64::INFINITY, f64::min)
 }
 
 fn from_segment(x: Point, a: Point, b: Point) -> f64 {

@@ -1,27 +1,30 @@
-//! Quadratic cells: each mid-edge node serves one edge, and no curved cell is folded.
+//! Curved cells: each node inside an edge serves one edge, and no curved cell is folded.
 //!
-//! A mesher moves mid-edge nodes to the curved boundary after it has made the straight cells. If a cell is flat, or large in
-//! comparison with the radius of the boundary, its map may no longer be one to one. With straight edges it is a good cell. The
-//! boundary there is then that of linear elements.
+//! A mesher moves the points of edges to the curved boundary after it has made the straight cells. If a cell is flat,
+//! or large in comparison with the radius of the boundary, its map may no longer be one to one. With straight edges it
+//! is a good cell. The boundary there is then that of linear elements.
 
 use super::faces::Cells;
 use crate::error::Result;
-use crate::linalg::{cross, dot, minus, pad};
+use crate::linalg::{cross, dot, length, minus, pad};
 use crate::mesh::Mesh;
-use crate::mesh::simplex::EDGES;
+use crate::mesh::shape;
 use crate::problem::order::Order;
+use nalgebra::DMatrix;
 use std::collections::HashSet;
+use std::sync::OnceLock;
 
 /// Share of the largest coefficient of a Jacobian below which a value is rounding. The Jacobian is zero where a cell is flat at
 /// a corner, as at the end of two edges that touch each other.
 const ROUNDING: f64 = 1e-9;
 
-/// Check the mid-edge nodes of a body and the Jacobians of its curved cells.
+/// Check the nodes inside the edges of a body and the Jacobians of its curved cells.
 ///
 /// # Errors
-/// A mid-edge node is on two edges or at a corner, or a cell is folded. The error gives the cell and the place in it.
+/// A node is on two edges or at a corner of another one, or a cell is folded. The error gives the cell and the place in
+/// it.
 pub fn check<const D: usize>(cells: &Cells<D>) -> Result<()> {
-    if !cells.is_quadratic() {
+    if !cells.is_curved() {
         return Ok(());
     }
     let mut ends = vec![None; cells.node_count()];
@@ -29,15 +32,18 @@ pub fn check<const D: usize>(cells: &Cells<D>) -> Result<()> {
         let nodes = cells.cell(cell);
         for j in 0..=D {
             for i in 0..=j {
-                let node = if i == j { nodes[i] } else { cells.simplices().middle(cell, [i, j]) };
+                let inside = (i < j).then(|| cells.simplices().inside(cell, [i, j])).into_iter().flatten();
                 let own = [nodes[i].min(nodes[j]), nodes[i].max(nodes[j])];
-                if *ends[node as usize].get_or_insert(own) != own {
-                    let error = cells.refuse("a node lies on two edges", &[cell], cells.at(node));
-                    return Err(error.help("mesh the geometry again"));
+                for node in inside.chain((i == j).then_some(nodes[i])) {
+                    if *ends[node as usize].get_or_insert(own) != own {
+                        let error = cells.refuse("a node lies on two edges", &[cell], cells.at(node));
+                        return Err(error.help("mesh the geometry again"));
+                    }
                 }
             }
         }
-        if is_folded(&nodes.iter().map(|&node| cells.at(node)).collect::<Vec<_>>(), D) {
+        let x: Vec<[f64; 3]> = nodes.iter().map(|&node| cells.at(node)).collect();
+        if is_curved(&x, D) && is_folded(&x, D) {
             let error = cells.refuse("a curved cell is folded", &[cell], cells.at(nodes[0]));
             return Err(error.help("refine the mesh there, or use order = 1"));
         }
@@ -45,41 +51,115 @@ pub fn check<const D: usize>(cells: &Cells<D>) -> Result<()> {
     Ok(())
 }
 
-/// Return whether a quadratic cell with these nodes, corners first, may be folded: a coefficient of its Jacobian in Bernstein's basis is negative.
+/// Return whether a cell has a point of an edge that is off its place on the chord by more than rounding. Most cells
+/// have none.
+fn is_curved(x: &[[f64; 3]], dimension: usize) -> bool {
+    shape::edges(x, dimension).any(|(ends, inside)| {
+        let ends = ends.map(|end| x[end]);
+        let most = 0.5 * ROUNDING * length(minus(ends[1], ends[0]));
+        let off = |k: usize| length(minus(inside[k], shape::on_chord(ends, k, inside.len())));
+        (0..inside.len()).any(|k| off(k) > most)
+    })
+}
+
+/// Return whether a curved cell with these nodes, corners first, may be folded: a coefficient of its Jacobian in
+/// Bernstein's basis is negative.
 ///
-/// The Jacobian is a polynomial of degree D, which lies between its least and its largest coefficient. A cell that passes has none that is
-/// negative. One that fails may still be good, but is so distorted that its straight form serves better.
+/// The Jacobian is a polynomial that lies between its least and its largest coefficient. A cell that passes has none
+/// that is negative. One that fails may still be good, but is so distorted that its straight form serves better.
 fn is_folded(x: &[[f64; 3]], dimension: usize) -> bool {
-    let coefficients = coefficients(&control_points(x, dimension), dimension);
+    let coefficients = Bernstein::of(x.len(), dimension).map_or_else(Vec::new, |basis| basis.jacobian(x));
     let largest = coefficients.iter().fold(0.0, |max: f64, c| max.max(c.abs()));
     coefficients.iter().any(|c| *c < -ROUNDING * largest)
 }
 
-/// Return the control points `b_ij` of the quadratic map `sum_ij l_i l_j b_ij` from corners and mid-edge nodes, where `l_i` are
-/// the barycentric coordinates.
-fn control_points(x: &[[f64; 3]], dimension: usize) -> [[[f64; 3]; 4]; 4] {
-    let mut b = [[[0.0; 3]; 4]; 4];
-    (0..=dimension).for_each(|i| b[i][i] = x[i]);
-    for (&middle, [i, j]) in x[dimension + 1..].iter().zip(EDGES) {
-        b[i][j] = std::array::from_fn(|c| 2.0 * middle[c] - 0.5 * (x[i][c] + x[j][c]));
-        b[j][i] = b[i][j];
-    }
-    b
+/// Bernstein's basis for the maps of simplices of one order and dimension.
+///
+/// With the control points b of degree k, the derivative along the edge 0a has the control points k (b_(p+e_a) -
+/// b_(p+e_0)), where p are powers of degree k - 1. A coefficient of a product of polynomials is the mean of the products
+/// of theirs, with multinomial weights.
+struct Bernstein {
+    /// Matrix from the points of the simplex to its control points.
+    control: DMatrix<f64>,
+    /// For all powers p: the control points p + e_0, p + e_1, ...
+    raised: Vec<Vec<usize>>,
+    /// For each product of derivatives along 01, 02 and in space 03: their powers p, the coefficient and the weight there.
+    products: Vec<([usize; 3], usize, f64)>,
 }
 
-/// Return the coefficients of the Jacobian in Bernstein's basis. The derivative along edge 0a is `2 sum_k l_k (b_ak - b_0k)`. The coefficient of a
-/// determinant of such sums at `l_k l_m ...` is the mean over all orders of k, m, ...
-fn coefficients(b: &[[[f64; 3]; 4]; 4], dimension: usize) -> Vec<f64> {
-    let d = |a: usize, k: usize| -> [f64; 3] { minus(b[a][k], b[0][k]) };
-    if dimension == 2 {
-        let area = |k: usize, m: usize| cross(d(1, k), d(2, m))[2];
-        let pairs = (0..3).flat_map(|k| (0..=k).map(move |m| (k, m)));
-        return pairs.map(|(k, m)| 0.5 * (area(k, m) + area(m, k))).collect();
+/// Powers of the barycentric coordinates in one function of the basis.
+type Powers = [usize; 4];
+
+/// Return the powers in each function of the basis of a degree on a simplex of a dimension.
+fn powers(degree: usize, dimension: usize) -> Vec<Powers> {
+    let height = if dimension == 2 { 0 } else { degree };
+    let all = (0..=degree).flat_map(|i| (0..=degree - i).map(move |j| (i, j, degree - i - j)));
+    all.flat_map(|(i, j, rest)| (0..=rest.min(height)).map(move |k| [rest - k, i, j, k])).collect()
+}
+
+/// Return the multinomial coefficient of powers.
+fn multinomial(powers: &Powers) -> f64 {
+    let factorial = |n: usize| (1..=n).map(|i| i as f64).product::<f64>();
+    factorial(powers.iter().sum()) / powers.iter().map(|&power| factorial(power)).product::<f64>()
+}
+
+impl Bernstein {
+    /// Return the basis for simplices with so many points, none if these are of no order.
+    fn of(points: usize, dimension: usize) -> Option<&'static Self> {
+        static BASES: [[OnceLock<Bernstein>; Order::HIGHEST]; 2] =
+            [const { [const { OnceLock::new() }; Order::HIGHEST] }; 2];
+        let order = Order::new(1 + (points - dimension - 1) / (dimension * (dimension + 1) / 2))?;
+        Some(BASES[dimension - 2][order.degree() - 1].get_or_init(|| Self::new(order, dimension)))
     }
-    let volume = |[k, m, n]: [usize; 3]| dot(&d(1, k), &cross(d(2, m), d(3, n)));
-    let orders = |k, m, n| [[k, m, n], [m, n, k], [n, k, m], [m, k, n], [k, n, m], [n, m, k]];
-    let triples = (0..4).flat_map(|k| (0..=k).flat_map(move |m| (0..=m).map(move |n| (k, m, n))));
-    triples.map(|(k, m, n)| orders(k, m, n).map(volume).iter().sum::<f64>() / 6.0).collect()
+
+    fn new(order: Order, dimension: usize) -> Self {
+        let degree = order.degree();
+        let [own, lower, last] = [degree, degree - 1, dimension * (degree - 1)].map(|degree| powers(degree, dimension));
+        let number = |all: &[Powers], powers: Powers| all.iter().position(|own| *own == powers).unwrap_or(0);
+        let raised = |p: &Powers| {
+            let raised = |a: usize| std::array::from_fn(|i| p[i] + usize::from(i == a));
+            (0..=dimension).map(|a| number(&own, raised(a))).collect()
+        };
+        let product = |at: usize| {
+            let all = [at % lower.len(), at / lower.len() % lower.len(), at / lower.len() / lower.len()];
+            let factors = || all[..dimension].iter().map(|&p| &lower[p]);
+            let sum = factors().fold([0; 4], |sum, p| std::array::from_fn(|i| sum[i] + p[i]));
+            (all, number(&last, sum), factors().map(multinomial).product::<f64>() / multinomial(&sum))
+        };
+        Self {
+            control: Self::control(order, &own, dimension),
+            raised: lower.iter().map(raised).collect(),
+            products: (0..lower.len().pow(dimension as u32)).map(product).collect(),
+        }
+    }
+
+    /// Return the matrix from points to control points: both give the map at points as many as there are `powers`.
+    fn control(order: Order, powers: &[Powers], dimension: usize) -> DMatrix<f64> {
+        let places = powers.iter().map(|at| at.map(|power| power as f64 / order.degree() as f64));
+        let (mut values, mut basis) = (Vec::new(), Vec::new());
+        for l in places {
+            values.extend(shape::weights(order, &l[..=dimension]));
+            let power = |p: &Powers| (0..4).map(|k| l[k].powi(p[k] as i32)).product::<f64>();
+            basis.extend(powers.iter().map(|p| multinomial(p) * power(p)));
+        }
+        let [values, basis] =
+            [values, basis].map(|rows| DMatrix::from_row_slice(powers.len(), rows.len() / powers.len(), &rows));
+        basis.lu().solve(&values).unwrap_or(values)
+    }
+
+    /// Return the coefficients of the Jacobian of a simplex with these points.
+    fn jacobian(&self, x: &[[f64; 3]]) -> Vec<f64> {
+        let b = &self.control * DMatrix::from_fn(x.len(), 3, |k, c| x[k][c]);
+        let edge = |from: usize, to: usize| [0, 1, 2].map(|c| b[(to, c)] - b[(from, c)]);
+        // the third column is the normal of the plane
+        let along = |p: &Vec<usize>, a: usize| p.get(a).map_or([0.0, 0.0, 1.0], |&to| edge(p[0], to));
+        let slopes: Vec<[[f64; 3]; 3]> = self.raised.iter().map(|p| [1, 2, 3].map(|a| along(p, a))).collect();
+        let mut coefficients = vec![0.0; self.products.iter().map(|product| product.1 + 1).max().unwrap_or(0)];
+        for ([p, q, r], at, weight) in &self.products {
+            coefficients[*at] += weight * dot(&cross(slopes[*p][0], slopes[*q][1]), &slopes[*r][2]);
+        }
+        coefficients
+    }
 }
 
 impl<const D: usize> Mesh<D> {
@@ -90,7 +170,7 @@ impl<const D: usize> Mesh<D> {
         if self.order == Order::P1 {
             return;
         }
-        let mut straight_edges = HashSet::new();
+        let mut straight_points = HashSet::new();
         loop {
             let folded: Vec<Vec<u32>> = self.folded_cells();
             if folded.is_empty() {
@@ -98,13 +178,12 @@ impl<const D: usize> Mesh<D> {
             }
             let mut has_moved = false;
             for cell in &folded {
-                for (&[i, j], &middle) in EDGES.iter().zip(&cell[D + 1..]) {
-                    if !straight_edges.insert(middle) {
-                        continue;
+                for (ends, inside) in shape::edges(cell, D) {
+                    let ends = ends.map(|end| self.points[cell[end] as usize]);
+                    for (k, &point) in inside.iter().enumerate().filter(|(_, point)| straight_points.insert(**point)) {
+                        let straight = shape::on_chord(ends, k, inside.len());
+                        has_moved |= std::mem::replace(&mut self.points[point as usize], straight) != straight;
                     }
-                    let [x, y] = [cell[i], cell[j]].map(|node| self.points[node as usize]);
-                    let straight = std::array::from_fn(|c| 0.5 * (x[c] + y[c]));
-                    has_moved |= std::mem::replace(&mut self.points[middle as usize], straight) != straight;
                 }
             }
             if !has_moved {
@@ -120,28 +199,22 @@ impl<const D: usize> Mesh<D> {
         let of_cells = self.groups.iter().filter(|group| group.dimension == D);
         let cells = of_cells.flat_map(|group| group.connectivity.chunks_exact(group.stride));
         let place = |&node: &u32| pad(self.points[node as usize]);
-        let folded = |cell: &&[u32]| is_folded(&cell.iter().map(place).collect::<Vec<_>>(), D);
-        let mut found: Vec<Vec<u32>> =
-            cells.filter(|cell| self.is_curved(cell)).filter(folded).map(<[u32]>::to_vec).collect();
+        let folded = |cell: &&[u32]| {
+            let x: Vec<[f64; 3]> = cell.iter().map(place).collect();
+            is_curved(&x, D) && is_folded(&x, D)
+        };
+        let mut found: Vec<Vec<u32>> = cells.filter(folded).map(<[u32]>::to_vec).collect();
         // A cell may be in several groups.
         found.sort_unstable();
         found.dedup();
         found
-    }
-
-    /// Return whether a quadratic cell has an edge whose middle is off its chord by more than rounding. Most cells have none.
-    fn is_curved(&self, cell: &[u32]) -> bool {
-        EDGES.iter().zip(&cell[D + 1..]).any(|(&[i, j], &middle)| {
-            let [x, y, m] = [cell[i], cell[j], middle].map(|node| self.points[node as usize]);
-            (0..D).any(|c| (2.0 * m[c] - x[c] - y[c]).abs() > 1e-9 * (0..D).map(|c| (x[c] - y[c]).abs()).sum::<f64>())
-        })
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::Group;
+    use crate::mesh::{EDGES, Group};
 
     fn triangle(middle: [f64; 3]) -> bool {
         let x = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.5, 0.0, 0.0], middle, [0.0, 0.5, 0.0]];
@@ -155,19 +228,45 @@ mod tests {
         assert!(triangle([0.25 - 1e-6, 0.25 - 1e-6, 0.0]));
     }
 
-    /// Return the least Jacobian of the map with these control points on a grid of the cell.
-    fn least(b: &[[[f64; 3]; 4]; 4]) -> f64 {
-        let n = 12;
-        let grid =
-            (0..=n).flat_map(|i| (0..=n - i).flat_map(move |j| (0..=n - i - j).map(move |k| [n - i - j - k, i, j, k])));
-        let jacobian = |l: [usize; 4]| {
-            let l = l.map(|i| i as f64 / n as f64);
-            let d = |a: usize| -> [f64; 3] {
-                std::array::from_fn(|c| (0..4).map(|k| l[k] * (b[a][k][c] - b[0][k][c])).sum())
-            };
-            dot(&d(1), &cross(d(2), d(3)))
+    /// Return the least Jacobian that differences of the map of a cell have on a grid.
+    fn least(x: &[[f64; 3]], order: Order, dimension: usize) -> f64 {
+        let (n, step) = (10, 1e-5);
+        let at = |l: [f64; 4]| -> [f64; 3] {
+            let weights = shape::weights(order, &l[..=dimension]);
+            std::array::from_fn(|c| weights.iter().zip(x).map(|(weight, x)| weight * x[c]).sum())
         };
-        grid.map(jacobian).fold(f64::INFINITY, f64::min)
+        let jacobian = |p: Powers| {
+            let l = p.map(|power| power as f64 / n as f64);
+            let along = |a: usize| {
+                let moved =
+                    |by: f64| at(std::array::from_fn(|i| l[i] + by * f64::from(i == a) - by * f64::from(i == 0)));
+                minus(moved(step), moved(-step)).map(|d| 0.5 * d / step)
+            };
+            dot(&cross(along(1), along(2)), &if dimension == 2 { [0.0, 0.0, 1.0] } else { along(3) })
+        };
+        powers(n, dimension).into_iter().map(jacobian).fold(f64::INFINITY, f64::min)
+    }
+
+    /// A triangle with the arc of an angle as its edge 12.
+    fn sector(order: Order, angle: f64) -> Vec<[f64; 3]> {
+        let arc = |s: f64| [(angle * s).cos(), (angle * s).sin(), 0.0];
+        let inside = |of: &dyn Fn(f64) -> [f64; 3]| {
+            (1..order.degree()).map(|k| of(k as f64 / order.degree() as f64)).collect::<Vec<_>>()
+        };
+        let radius = |end: f64| inside(&|s| arc(end).map(|c| s * c));
+        [vec![[0.0; 3], arc(0.0), arc(1.0)], radius(0.0), inside(&arc), radius(1.0)].concat()
+    }
+
+    /// Sectors of any order that pass have a positive Jacobian. That of more than 180 degrees is folded at its centre.
+    #[test]
+    fn triangles_of_all_orders_that_pass_are_not_folded() {
+        for order in (2..=Order::HIGHEST).filter_map(Order::new) {
+            for angle in [0.3, 0.8, 1.2, 1.6, 2.0, 2.4, 2.8, 3.1, 3.5, 4.5] {
+                let x = sector(order, angle);
+                assert!(is_folded(&x, 2) || least(&x, order, 2) > -1e-6, "{order:?} {angle}");
+            }
+            assert!(!is_folded(&sector(order, 1.2), 2) && is_folded(&sector(order, 3.5), 2), "{order:?}");
+        }
     }
 
     /// The mid-edge nodes of the tetrahedra are random. A cell that passes has a positive Jacobian.
@@ -182,12 +281,11 @@ mod tests {
         for _ in 0..300 {
             let corners = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
             let size = 0.2 + 0.4 * random();
-            let middle = |[i, j]: [usize; 2]| -> [f64; 3] {
-                std::array::from_fn(|c| 0.5 * (corners[i][c] + corners[j][c]) + size * random())
-            };
+            let middle =
+                |[i, j]: [usize; 2]| shape::on_chord([corners[i], corners[j]], 0, 1).map(|c| c + size * random());
             let x = [&corners[..], &EDGES.map(middle)].concat();
-            let (found, least) = (is_folded(&x, 3), least(&control_points(&x, 3)));
-            assert!(found || least > 0.0, "{least}");
+            let found = is_folded(&x, 3);
+            assert!(found || least(&x, Order::P2, 3) > -1e-6);
             counts[usize::from(found)] += 1;
         }
         assert!(counts.iter().all(|&count| count > 30), "{counts:?}");

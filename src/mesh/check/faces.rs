@@ -13,7 +13,7 @@ pub const NONE: u32 = u32::MAX;
 pub struct Cells<'a, const D: usize> {
     mesh: &'a Mesh<D>,
     group: &'a Group,
-    /// Nodes per cell: corners, then mid-edge nodes if its elements are quadratic.
+    /// Nodes per cell: corners, then those inside edges unless its elements are linear.
     stride: usize,
     /// Point of the mesh of each node.
     pub points: Vec<u32>,
@@ -58,8 +58,8 @@ impl<'a, const D: usize> Cells<'a, D> {
     }
 
     /// Return whether edges have nodes between their ends.
-    pub fn is_quadratic(&self) -> bool {
-        self.simplices().is_quadratic()
+    pub fn is_curved(&self) -> bool {
+        self.simplices().is_curved()
     }
 
     /// Return the nodes of a cell.
@@ -113,7 +113,7 @@ pub fn check<const D: usize>(faces: &Faces<D>, cells: &Cells<D>) -> Result<()> {
             let what = "two cells overlap: both lie on the same side of the facet that they share";
             return Err(refuse(what));
         }
-        if cells.is_quadratic() {
+        if cells.is_curved() {
             let [mut first, mut second] = [a, b].map(|face| face.nodes(simplices).skip(D).collect::<Vec<_>>());
             first.sort_unstable();
             second.sort_unstable();

@@ -46,12 +46,12 @@ impl<'a> InUse<'a> {
             return;
         }
         let corners = dimension + 1;
-        let wanted = if cells.is_quadratic() { self.group.stride } else { corners };
+        let wanted = if cells.is_curved() { self.group.stride } else { corners };
         let edges = if dimension + 2 == D && dimension == 1 { self.edges(cells, node) } else { HashSet::new() };
+        let mut own = Vec::with_capacity(wanted);
         for (simplex, found) in self.group.simplices().zip(&mut self.found) {
-            let mut own = [NONE; 6];
-            own.iter_mut().zip(&simplex[..wanted]).for_each(|(own, &point)| *own = node[point as usize]);
-            let own = &own[..wanted];
+            own.clear();
+            own.extend(simplex[..wanted].iter().map(|&point| node[point as usize]));
             if own.contains(&NONE) {
                 continue;
             }
@@ -62,7 +62,7 @@ impl<'a> InUse<'a> {
                 (_, duty) => {
                     let has_all =
                         |face: &Face<D>| face.nodes(cells.simplices()).skip(D).all(|node| own.contains(&node));
-                    let cells = faces.at(own).filter(has_all).count();
+                    let cells = faces.at(&own).filter(has_all).count();
                     cells == 1 || duty == Duty::Holds && cells > 0
                 }
             };

@@ -49,30 +49,6 @@ fn cube(from: [f64; 3], first: u32) -> (Vec<[f64; 3]>, Vec<u32>) {
     (points, cells)
 }
 
-/// Return the same simplices with a node in the middle of each edge.
-fn quadratic<const D: usize>(mesh: &Mesh<D>) -> Mesh<D> {
-    let edges = [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]];
-    let (mut points, mut middles) = (mesh.points.clone(), std::collections::HashMap::new());
-    let mut groups = mesh.groups.to_vec();
-    for group in &mut groups {
-        let corners = group.dimension + 1;
-        let mut connectivity = Vec::new();
-        for simplex in group.simplices() {
-            connectivity.extend_from_slice(simplex);
-            for [i, j] in &edges[..corners * (corners - 1) / 2] {
-                let ends = [simplex[*i].min(simplex[*j]), simplex[*i].max(simplex[*j])];
-                connectivity.push(*middles.entry(ends).or_insert_with(|| {
-                    let [a, b] = ends.map(|end| mesh.points[end as usize]);
-                    points.push(std::array::from_fn(|c| 0.5 * (a[c] + b[c])));
-                    points.len() as u32 - 1
-                }));
-            }
-        }
-        (group.connectivity, group.stride) = (connectivity, corners * (corners + 1) / 2);
-    }
-    Mesh { points, order: Order::P2, groups: groups.into(), ..mesh.clone() }
-}
-
 #[test]
 fn good_meshes_are_counted() {
     let (points, cells) = squares();
@@ -81,9 +57,9 @@ fn good_meshes_are_counted() {
     let space = mesh(points, &cells);
     for (found, counts) in [
         (check(&plane, &[]), [3, 6, 1]),
-        (check(&quadratic(&plane), &[]), [3, 6, 1]),
+        (check(&plane.higher_order(Order::P2), &[]), [3, 6, 1]),
         (check(&space, &[]), [6, 12, 1]),
-        (check(&quadratic(&space), &[]), [6, 12, 1]),
+        (check(&space.higher_order(Order::P2), &[]), [6, 12, 1]),
     ] {
         let found = found.unwrap();
         assert_eq!([found.inner, found.outer, found.parts.count], counts);
@@ -129,7 +105,7 @@ fn cracks() {
     // The left square has a node of its own at corner 4.
     let own = mesh([&points[..], &[[1.0, 1.0]]].concat(), &[0, 1, 3, 1, 6, 3, 1, 2, 4, 2, 5, 4]);
     refused(&own, &["nodes of their own", "at (1, 1)"]);
-    refused(&quadratic(&own), &["nodes of their own"]);
+    refused(&own.higher_order(Order::P2), &["nodes of their own"]);
     // Both cubes have their own nodes on the common face.
     let (mut points, mut cells) = cube([0.0; 3], 0);
     let (more, others) = cube([1.0, 0.0, 0.0], 8);
@@ -158,7 +134,7 @@ fn cells_that_hang_by_less_than_a_facet() {
 #[test]
 fn mid_edge_nodes() {
     let (points, cells) = squares();
-    let good = quadratic(&mesh(points, &cells));
+    let good = mesh(points, &cells).higher_order(Order::P2);
     let mut other = good.clone();
     // The right square alone gets a second node in the middle of 1-4.
     let middle = good.groups[0].connectivity[6 + 3];
@@ -182,7 +158,7 @@ fn groups_lie_on_their_bodies() {
     let (points, cells) = squares();
     let plane = || mesh(points.clone(), &cells);
     let bottom = with_group(plane(), "bottom", 1, vec![0, 1, 1, 2]);
-    for mesh in [bottom.clone(), quadratic(&bottom)] {
+    for mesh in [bottom.clone(), bottom.higher_order(Order::P2)] {
         assert!(check(&mesh, &[("bottom", Duty::Acts), ("bottom", Duty::Holds)]).is_ok());
     }
     // One facet is inside, where a support may constrain it. Others are not facets of the body.
@@ -199,7 +175,7 @@ fn groups_lie_on_their_bodies() {
     let message = check(&with_group(plane(), "bottom", 1, vec![0, 1, 1, 0]), &[("bottom", Duty::Acts)]).unwrap_err();
     assert!(message.contains("stands twice in it") && message.contains("element 91"), "{message}");
     // The mid-edge nodes are exchanged.
-    let mut wrong = quadratic(&bottom);
+    let mut wrong = bottom.higher_order(Order::P2);
     wrong.groups[1].connectivity.swap(2, 5);
     assert!(check(&wrong, &[("bottom", Duty::Acts)]).is_err());
     // A group that lies elsewhere is left to the caller, which reports the line of the scene.
