@@ -66,9 +66,10 @@ fn surface(asked: &Asked) -> DMatrix<f64> {
     let Asked { points: n, length, even, .. } = *asked;
     let waves = (asked.cut.floor() as usize).min((n - 1) / 2);
     // waves in a side: 0, 1, 1, 2, 2, ... as cosine and sine, or halves of them as cosines
-    let modes: Vec<(f64, bool)> = match even {
-        true => (0..=2 * waves).map(|k| (k as f64 / 2.0, true)).collect(),
-        false => (0..=2 * waves).map(|k| (k.div_ceil(2) as f64, k % 2 == 0)).collect(),
+    let modes: Vec<(f64, bool)> = if even {
+        (0..=2 * waves).map(|k| (k as f64 / 2.0, true)).collect()
+    } else {
+        (0..=2 * waves).map(|k| (k.div_ceil(2) as f64, k % 2 == 0)).collect()
     };
     let spacing = length / if even { n - 1 } else { n } as f64;
     let basis = DMatrix::from_fn(n, modes.len(), |i, k| {

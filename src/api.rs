@@ -1,10 +1,13 @@
-//! The library: a scene is built in Rust and solved, and its solution is read as arrays. The command line goes the same way.
+//! The library: a scene is built in Rust and solved, and its solution is read as arrays. The command line goes the same
+//! way.
 //!
-//! Lengths and stresses are in any consistent units; forces are in stress times length squared, in the plane for a thickness of one length.
-//! Points and vectors have three components, z = 0 in the plane. docs/library.md has more examples.
+//! Lengths and stresses are in any consistent units; forces are in stress times length squared, in the plane for a
+//! thickness of one length. Points and vectors have three components, z = 0 in the plane. docs/library.md has more
+//! examples.
 //!
-//! In the example two squares of side 1 are pressed together by a pressure of 1. They have Young's modulus 100 and Poisson's ratio 0; the
-//! pressure in the layer is 50 times its compression. Each square becomes 1/100 shorter, and the layer 1/50 thinner.
+//! In the example two squares of side 1 are pressed together by a pressure of 1. They have Young's modulus 100 and
+//! Poisson's ratio 0; the pressure in the layer is 50 times its compression. Each square becomes 1/100 shorter, and the
+//! layer 1/50 thinner.
 //!
 //! ```
 //! use winkler::api::{BodySpec, ContactSpec, LayerSpec, MeshArrays, Scene, Session, solve};
@@ -102,7 +105,8 @@ impl Solution {
         verdict::exit_code(&self.done) == 0
     }
 
-    /// Return the contents of `report.json`: counters, forces, approaches, largest stresses, times, warnings and settings.
+    /// Return the contents of `report.json`: counters, forces, approaches, largest stresses, times, warnings and
+    /// settings.
     pub fn report(&self) -> &Report {
         &self.report
     }
@@ -112,13 +116,14 @@ impl Solution {
         &self.done.outcome.rows
     }
 
-    /// Return the number of pairs of contact surfaces. Pairs of the scene come first, in its order, then those that were found.
+    /// Return the number of pairs of contact surfaces. Pairs of the scene come first, in its order, then those that
+    /// were found.
     pub fn pairs(&self) -> usize {
         self.done.model().pairs.len()
     }
 
-    /// Return positions, gaps, compressions, pressures and normal displacements at the contact points of a pair, on every rank. `pair` is less
-    /// than [`Solution::pairs`].
+    /// Return positions, gaps, compressions, pressures and normal displacements at the contact points of a pair, on
+    /// every rank. `pair` is less than [`Solution::pairs`].
     ///
     /// # Panics
     /// When there is no such pair.
@@ -126,9 +131,11 @@ impl Solution {
         report::contact_table(&self.done, self.estimate.as_ref(), pair)
     }
 
-    /// Return displacements and stresses at the nodes of a body; none on ranks that have no part of it. Bodies are in the order of the scene.
+    /// Return displacements and stresses at the nodes of a body; none on ranks that have no part of it. Bodies are in
+    /// the order of the scene.
     ///
-    /// If a body is distributed over ranks, each rank has the nodes of its part. Every cell is in one part; nodes between parts are in several.
+    /// If a body is distributed over ranks, each rank has the nodes of its part. Every cell is in one part; nodes
+    /// between parts are in several.
     ///
     /// # Errors
     /// The failure of a solver that should have found the interior of the body.
@@ -143,8 +150,9 @@ impl Solution {
         }
     }
 
-    /// Return for each node of [`Solution::body`] its index among the points of the mesh. These are [`MeshArrays::points`], or the points of a
-    /// file that a group uses. Nodes that are not vertices have `u32::MAX` if the order of the body or of the mesh is above two.
+    /// Return for each node of [`Solution::body`] its index among the points of the mesh. These are
+    /// [`MeshArrays::points`], or the points of a file that a group uses. Nodes that are not vertices have `u32::MAX`
+    /// if the order of the body or of the mesh is above two.
     ///
     /// # Panics
     /// When there is no such body.

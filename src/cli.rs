@@ -14,7 +14,8 @@ use std::ffi::OsString;
 use std::io::{ErrorKind, IsTerminal};
 use std::path::{Path, PathBuf};
 
-/// Frictionless contact of elastic bodies through nonlinear Winkler layers, by Newton's method or Robin-Robin domain decomposition on PETSc.
+/// Frictionless contact of elastic bodies through nonlinear Winkler layers, by Newton's method or Robin-Robin domain
+/// decomposition on PETSc.
 ///
 /// PETSc options are typed as in every PETSc program, for all bodies (-ksp_type cg -pc_type hypre) or for one
 /// (-upper_ksp_type cg); -help lists them.
@@ -104,7 +105,8 @@ enum Solving {
     Sweep(sweep::SweepArgs),
 }
 
-/// Return the first word among PETSc options that is an option of the program, typed with one dash instead of two. It has no dashes.
+/// Return the first word among PETSc options that is an option of the program, typed with one dash instead of two. It
+/// has no dashes.
 fn option_with_one_dash(petsc: &[String]) -> Option<String> {
     let command = Cli::command();
     let known = command.get_subcommands().flat_map(clap::Command::get_arguments).filter_map(clap::Arg::get_long);

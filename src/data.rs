@@ -1,6 +1,7 @@
 //! Functions that are given by files, heights of measured surfaces and profiles, for the expressions of a scene.
 //!
-//! Data flow: file -> numbers in rows (`read`) -> a plane subtracted -> [`Grid`] -> value and gradient at any place ([`Data::sample`]).
+//! Data flow: file -> numbers in rows (`read`) -> a plane subtracted -> [`Grid`] -> value and gradient at any place
+//! ([`Data::sample`]).
 
 mod grid;
 mod read;
@@ -69,7 +70,8 @@ impl Data {
         })
     }
 
-    /// Return the refusal of a place without a value. `what` is the quantity whose expression, at `here`, needs the value.
+    /// Return the refusal of a place without a value. `what` is the quantity whose expression, at `here`, needs the
+    /// value.
     pub fn outside(&self, here: &Place, what: &str, place: &[f64]) -> Error {
         let at: Vec<String> = place.iter().map(|&x| shown(x)).collect();
         let axes = self.grid().map_or(&[][..], |grid| &grid.axes[..place.len().min(2)]);

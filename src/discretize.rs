@@ -93,15 +93,15 @@ impl Earlier {
 
 /// Turn a scene and its mesh into a model. Collective.
 ///
-/// The first rank prepares everything but matrices, as in a serial run. Then every rank receives what it needs of each body, and
-/// assembles it. `factory` turns each body of this rank into one with a solver.
+/// The first rank prepares everything but matrices, as in a serial run. Then every rank receives what it needs of each
+/// body, and assembles it. `factory` turns each body of this rank into one with a solver.
 ///
 /// The problem `before` on the same mesh, which left `kept`, gives all pairs and bodies that would be the same but for
 /// loads, prescribed displacements, gaps and laws.
 ///
 /// # Errors
-/// The scene may contradict its mesh: missing groups, surfaces of the wrong body, supports that contradict each other, surfaces
-/// that do not face each other. Failures of `factory` are returned, too.
+/// The scene may contradict its mesh: missing groups, surfaces of the wrong body, supports that contradict each other,
+/// surfaces that do not face each other. Failures of `factory` are returned, too.
 pub fn discretize<const D: usize>(
     request: &Request<D>,
     kept: &mut Kept<D>,
@@ -149,9 +149,12 @@ where
     let Assembler { assemblies, shapes, .. } = assembler;
     let pairings = pairings + if rank == 0 { searched } else { 0 };
     let meshes = keep.then(|| Rc::new(KeptMeshes { shapes, fine }) as Rc<dyn Meshes>);
-    let of_rank = |slot: BodySlot| match rank == 0 && !slot.motions.is_empty() {
-        true => BodySlot { local: Some(Body::rigid(&slot.motions)), ..slot },
-        false => slot,
+    let of_rank = |slot: BodySlot| {
+        if rank == 0 && !slot.motions.is_empty() {
+            BodySlot { local: Some(Body::rigid(&slot.motions)), ..slot }
+        } else {
+            slot
+        }
     };
     slots.extend(rigid.into_iter().map(of_rank));
     let mut model = Model::new(slots, pairs, exchange);
@@ -182,7 +185,8 @@ where
 }
 
 impl Discrete {
-    /// Keep the gap of pair `i` as an earlier load step has left it, with this offset (a length), which is no unknown any more.
+    /// Keep the gap of pair `i` as an earlier load step has left it, with this offset (a length), which is no unknown
+    /// any more.
     pub fn lock(&mut self, i: usize, offset: f64) {
         let model = &mut self.model;
         model.pairs[i].offset = offset;
@@ -213,8 +217,8 @@ impl Discrete {
         self.sides(i).map(|side| self.model.pairs[i].surfaces[side].as_str())
     }
 
-    /// Send every rank what only the owner rank of a body has: its largest stiffness and the stiffness at its contact rows.
-    /// Collective, after all ranks have made their problem.
+    /// Send every rank what only the owner rank of a body has: its largest stiffness and the stiffness at its contact
+    /// rows. Collective, after all ranks have made their problem.
     pub fn share(&mut self) {
         let count = self.model.bodies.len();
         let mut message = vec![0.0; count + 2 * self.model.points()];

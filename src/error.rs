@@ -28,7 +28,8 @@ pub struct Place {
 }
 
 impl Place {
-    /// Return the line of the Rust program that calls the function with the attribute `#[track_caller]`; `word` is what the caret marks.
+    /// Return the line of the Rust program that calls the function with the attribute `#[track_caller]`; `word` is what
+    /// the caret marks.
     #[track_caller]
     pub fn here(word: &str) -> Self {
         let caller = std::panic::Location::caller();
@@ -176,7 +177,8 @@ impl Error {
         error
     }
 
-    /// Return an error without a message, which is not printed, with the same exit code as the error of another rank that has the message.
+    /// Return an error without a message, which is not printed, with the same exit code as the error of another rank
+    /// that has the message.
     pub fn silent(exit_code: i32) -> Self {
         let kinds = [Kind::Usage, Kind::Scene, Kind::Mesh, Kind::Solver, Kind::File];
         let stopped = (exit_code > SIGNALLED).then(|| Kind::Stopped(exit_code - SIGNALLED));

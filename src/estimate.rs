@@ -1,8 +1,10 @@
 //! The estimated difference of the discrete solution from the exact one: in bodies, layers and pressures.
 //!
-//! A smoother displacement is recovered from the discrete one. The difference of their stresses, cell by cell, is the error in
-//! the energy norm; in cells of quadratic elements, that of the recovered displacement from its nodal interpolant where this is smaller. The recovered displacement also shows the part of the displacement that the elements cannot represent, which acts like a load
-//! on the discrete problem. The response to that load is the error of nodal displacements and nodal pressures.
+//! A smoother displacement is recovered from the discrete one. The difference of their stresses, cell by cell, is the
+//! error in the energy norm; in cells of quadratic elements, that of the recovered displacement from its nodal
+//! interpolant where this is smaller. The recovered displacement also shows the part of the displacement that the
+//! elements cannot represent, which acts like a load on the discrete problem. The response to that load is the error of
+//! nodal displacements and nodal pressures.
 
 mod force;
 mod held;
@@ -25,8 +27,8 @@ use pressure::{LayerError, PressureErrors, SAFETY};
 /// Estimated errors of a discrete solution.
 #[derive(Debug, Clone, Default)]
 pub struct Estimate {
-    /// Part of each cell of each body in the error of displacements at the loads: its squared energy error, and the energy of the strip at its
-    /// straight facets. Empty for a body of another rank.
+    /// Part of each cell of each body in the error of displacements at the loads: its squared energy error, and the
+    /// energy of the strip at its straight facets. Empty for a body of another rank.
     pub cells: Vec<Vec<f64>>,
     /// Power of its size with which the energy error of each of these cells falls.
     pub rates: Vec<Vec<f64>>,
@@ -40,7 +42,8 @@ pub struct Estimate {
     pub nodal: f64,
     /// Error of the pressure at each contact point, exact minus discrete.
     pub pressure_error: Vec<f64>,
-    /// Relative error of the pressures of each pair at its points: root mean square over the surface, with the factor `SAFETY`.
+    /// Relative error of the pressures of each pair at its points: root mean square over the surface, with the factor
+    /// `SAFETY`.
     pub pressure: Vec<f64>,
     /// The part of it on the facets at sharp ends of the contact, where the pressure may be singular.
     pub ends: Vec<f64>,
@@ -75,15 +78,16 @@ impl Estimate {
         }
     }
 
-    /// Return whether the errors are a guess: of pressures at the edge of the contact, or because the energy error is as large as the solution.
+    /// Return whether the errors are a guess: of pressures at the edge of the contact, or because the energy error is
+    /// as large as the solution.
     pub fn is_guess(&self) -> bool {
         self.guesses.iter().any(Option::is_some) || self.energy >= 1.0 || self.energy.is_nan()
     }
 }
 
-/// Relative error of the response, in the energy norm, in the solve for the nodal errors. Most of the energy is inside of the bodies, and the part at
-/// the contact settles later. On slender parts with a tolerance of 0.1, multigrid gave displacements that were 2.6 and 6 times smaller than those of a
-/// direct solver. With 0.01 they differ by 5 %.
+/// Relative error of the response, in the energy norm, in the solve for the nodal errors. Most of the energy is inside
+/// of the bodies, and the part at the contact settles later. On slender parts with a tolerance of 0.1, multigrid gave
+/// displacements that were 2.6 and 6 times smaller than those of a direct solver. With 0.01 they differ by 5 %.
 const TOLERANCE: f64 = 0.01;
 
 /// Estimate the error of an iterate with its layer state. `step` solves for the response of the bodies. Collective.
@@ -183,7 +187,8 @@ struct NodalErrors {
     energy: f64,
 }
 
-/// Solve for the errors of nodal values. `loads` has one entry a dof of each local body, and `mean_error` is that of [`LocalErrors`], n.
+/// Solve for the errors of nodal values. `loads` has one entry a dof of each local body, and `mean_error` is that of
+/// [`LocalErrors`], n.
 fn nodal_errors(
     model: &mut Model,
     step: &mut dyn LinearStep,
@@ -200,8 +205,8 @@ fn nodal_errors(
     Ok(NodalErrors { field, closing, energy })
 }
 
-/// Return the relative energy norm of an error from its squared energy norm. `reference` is the energy of bodies and layers, without the energy `held` of
-/// springs that only hold bodies in place.
+/// Return the relative energy norm of an error from its squared energy norm. `reference` is the energy of bodies and
+/// layers, without the energy `held` of springs that only hold bodies in place.
 fn relative_norm(squared: f64, reference: f64, held: f64) -> f64 {
     if reference > 0.0 {
         (squared.max(0.0) / reference).sqrt()
@@ -228,7 +233,8 @@ struct LocalErrors {
     loads: Vec<Vec<f64>>,
     /// Squared energy error of each layer.
     layers: Vec<f64>,
-    /// Difference of the compression at each contact point, n, from its mean around the point, which the discrete problem takes in its place.
+    /// Difference of the compression at each contact point, n, from its mean around the point, which the discrete
+    /// problem takes in its place.
     mean_error: Vec<f64>,
 }
 
@@ -249,7 +255,8 @@ impl LocalErrors {
         local
     }
 
-    /// Add the error of the layer of a pair, and the error of its forces on both bodies. To be called for the pairs in their order. Collective.
+    /// Add the error of the layer of a pair, and the error of its forces on both bodies. To be called for the pairs in
+    /// their order. Collective.
     fn add_pair(
         &mut self,
         meshes: &dyn Meshes,
@@ -323,8 +330,9 @@ fn to_dofs(meshes: &dyn Meshes, model: &Model, loads: &mut [Vec<f64>]) {
     }
 }
 
-/// Return the body with the largest error, and the centre of its worst cell in the scene, if the estimated energy error is as large as the solution. The mesh
-/// is then too coarse, or its cells are too flat, for the estimate to mean anything. Collective.
+/// Return the body with the largest error, and the centre of its worst cell in the scene, if the estimated energy error
+/// is as large as the solution. The mesh is then too coarse, or its cells are too flat, for the estimate to mean
+/// anything. Collective.
 pub fn lost_at(meshes: &dyn Meshes, model: &Model, estimate: &Estimate) -> Option<(usize, [f64; 3])> {
     if estimate.energy < 1.0 {
         return None;
@@ -344,8 +352,9 @@ pub fn lost_at(meshes: &dyn Meshes, model: &Model, estimate: &Estimate) -> Optio
     Some((body, centre))
 }
 
-/// Return the relative tolerance of the response to loads that contain those of `mean_error`, n. Springs of a stiff layer resist these means with an
-/// energy. The bodies give way to these springs, and the share rho/(rho + kappa) of the energy is left in the response.
+/// Return the relative tolerance of the response to loads that contain those of `mean_error`, n. Springs of a stiff
+/// layer resist these means with an energy. The bodies give way to these springs, and the share rho/(rho + kappa) of
+/// the energy is left in the response.
 fn tolerance(model: &Model, layer: &Layer, mean_error: &[f64]) -> f64 {
     let (mut full, mut left) = (0.0, 0.0);
     for (q, rho) in meeting_slopes(model).into_iter().enumerate() {

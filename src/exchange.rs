@@ -4,10 +4,11 @@ use crate::error::{Error, Kind, Result};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// The messages between the ranks of a run. Calls are collective unless they say otherwise. A single process has no messages: it is the default.
+/// The messages between the ranks of a run. Calls are collective unless they say otherwise. A single process has no
+/// messages: it is the default.
 pub trait Exchange {
-    /// Replace `values` by their sum over the ranks (MPI_Allreduce). All ranks get the same numbers, as MPI guarantees. If every body lives on one
-    /// rank, every entry is non-zero on one rank only, so that sums are exact.
+    /// Replace `values` by their sum over the ranks (MPI_Allreduce). All ranks get the same numbers, as MPI guarantees.
+    /// If every body lives on one rank, every entry is non-zero on one rank only, so that sums are exact.
     fn sum(&self, _values: &mut [f64]) {}
     /// Return the number of ranks.
     fn ranks(&self) -> usize {
@@ -48,7 +49,8 @@ pub trait Plain: Serialize + DeserializeOwned {}
 
 impl<T: Serialize + DeserializeOwned> Plain for T {}
 
-/// Give each rank what the first rank has for it (scatter). `part` is called on the first rank only, for each other rank and then for itself. Collective.
+/// Give each rank what the first rank has for it (scatter). `part` is called on the first rank only, for each other
+/// rank and then for itself. Collective.
 ///
 /// # Errors
 /// A message that cannot be read.
@@ -60,7 +62,8 @@ pub fn scatter<T: Plain>(exchange: &dyn Exchange, mut part: impl FnMut(usize) ->
     Ok(part(0))
 }
 
-/// Return the values of all ranks on the first one, in the order of the ranks, and none on the others (gather). Collective.
+/// Return the values of all ranks on the first one, in the order of the ranks, and none on the others (gather).
+/// Collective.
 ///
 /// # Errors
 /// A message that cannot be read.
@@ -83,7 +86,8 @@ pub fn all_gather<T: Plain>(exchange: &dyn Exchange, mine: T) -> Vec<T> {
     exchange.all_gather(pack(&mine)).into_iter().map(received).collect()
 }
 
-/// Signals that end a run. They are bits of one number, and are summed over the ranks in messages that ranks send anyway.
+/// Signals that end a run. They are bits of one number, and are summed over the ranks in messages that ranks send
+/// anyway.
 pub const ASKS: usize = 3;
 
 /// Return one number per kind of request, to be summed over the ranks.

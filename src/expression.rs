@@ -18,8 +18,8 @@ use std::sync::Arc;
 
 /// An expression such as `5e-4 * max(0, 1 - (x - 4)^2)^1.5`, parsed once and cheap to clone.
 ///
-/// It may have + - * / ^, comparisons, && || !, `pi`, and the functions of docs/scene-file.md. -x^2 is -(x^2), and a^b^c is a^(b^c).
-/// Comparisons give 1 or 0. A value outside the domain of a function is NaN and stays NaN.
+/// It may have + - * / ^, comparisons, && || !, `pi`, and the functions of docs/scene-file.md. -x^2 is -(x^2), and
+/// a^b^c is a^(b^c). Comparisons give 1 or 0. A value outside the domain of a function is NaN and stays NaN.
 #[derive(Clone, JsonSchema)]
 #[schemars(with = "Field")]
 pub struct Expression {
@@ -38,7 +38,8 @@ const COORDINATES: [&str; 4] = ["x", "y", "z", "k"];
 impl Expression {
     /// Parse a text, which stands at `place` with or without the quotes of a TOML string.
     ///
-    /// A name that is not in the scope is refused, with a caret at the name. Files of data are read when the first expression uses them.
+    /// A name that is not in the scope is refused, with a caret at the name. Files of data are read when the first
+    /// expression uses them.
     ///
     /// # Errors
     /// Texts that are no expression, and data that cannot be read.
@@ -59,8 +60,8 @@ impl Expression {
         Ok(Self { program, variables: scope.variables.into(), text: text.into(), place: place.clone() })
     }
 
-    /// Return the value for given values of the variables, in the order of the scope; NaN where it is not defined. Values beyond the variables
-    /// are not used.
+    /// Return the value for given values of the variables, in the order of the scope; NaN where it is not defined.
+    /// Values beyond the variables are not used.
     pub fn eval(&self, values: &[f64]) -> f64 {
         self.program.eval(&full(values))
     }
@@ -88,8 +89,8 @@ impl Expression {
         self.program.data()
     }
 
-    /// Return the refusal of values for which data are needed at a place where they have no value; none if there is no such place. `what` is the
-    /// quantity in the message.
+    /// Return the refusal of values for which data are needed at a place where they have no value; none if there is no
+    /// such place. `what` is the quantity in the message.
     pub fn outside(&self, what: &str, values: &[f64]) -> Option<Error> {
         let (data, place) = self.program.outside(&full(values))?;
         Some(data.outside(&self.place, what, &place))
@@ -160,8 +161,8 @@ impl fmt::Debug for Field {
 }
 
 impl Field {
-    /// Parse an expression whose variables are coordinates and the iteration: see `Expression::parse`. An expression without variables becomes
-    /// a constant.
+    /// Parse an expression whose variables are coordinates and the iteration: see `Expression::parse`. An expression
+    /// without variables becomes a constant.
     ///
     /// # Errors
     /// Those of `Expression::parse`, and a constant that is not finite.
@@ -179,7 +180,8 @@ impl Field {
         }
     }
 
-    /// Return the value at a point (z = 0 in plane problems), with NaN for k. It is NaN or infinite where the expression is not defined.
+    /// Return the value at a point (z = 0 in plane problems), with NaN for k. It is NaN or infinite where the
+    /// expression is not defined.
     pub fn eval(&self, x: [f64; 3]) -> f64 {
         self.eval_at(x, f64::NAN)
     }
@@ -268,7 +270,8 @@ impl Field {
         self.expression().map(Expression::place)
     }
 
-    /// Return the refusal of a value at a point. `values` are those of the coordinates, and of the iteration if it counts.
+    /// Return the refusal of a value at a point. `values` are those of the coordinates, and of the iteration if it
+    /// counts.
     fn refuse(&self, what: &str, values: &[f64], value: f64) -> Error {
         let Field::Expression(expression) = self else {
             let at: Vec<String> = values.iter().map(f64::to_string).collect();

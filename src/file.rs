@@ -20,8 +20,8 @@ pub fn read(path: &Path) -> Result<Vec<u8>> {
     file.read_to_end(&mut bytes).map_err(|cause| Error::file(path, "read", &cause)).map(|_| bytes)
 }
 
-/// Open a regular file. Others are refused: devices and pipes may have no end, or keep a reader waiting for ever. So is what Git LFS leaves in
-/// the place of a large file that was not fetched.
+/// Open a regular file. Others are refused: devices and pipes may have no end, or keep a reader waiting for ever. So is
+/// what Git LFS leaves in the place of a large file that was not fetched.
 ///
 /// # Errors
 /// [`Kind::File`]: the path is no regular file, or cannot be read, or is a pointer of Git LFS.
@@ -63,8 +63,8 @@ pub fn kind_of(kind: FileType) -> &'static str {
     }
 }
 
-/// Return the bytes of a text with the line ends of Unix, if it has those of old Macs, carriage returns alone. Other texts are unchanged, so that
-/// every line keeps its number.
+/// Return the bytes of a text with the line ends of Unix, if it has those of old Macs, carriage returns alone. Other
+/// texts are unchanged, so that every line keeps its number.
 pub fn with_unix_lines(mut bytes: Vec<u8>) -> Vec<u8> {
     if bytes.contains(&b'\r') && !bytes.contains(&b'\n') {
         bytes.iter_mut().filter(|byte| **byte == b'\r').for_each(|byte| *byte = b'\n');
@@ -81,12 +81,14 @@ pub fn other_encoding(bytes: &[u8]) -> Option<&'static str> {
     }
 }
 
-/// Return the bytes that programs can still take without swapping, as Linux reports them. On other systems there is no limit.
+/// Return the bytes that programs can still take without swapping, as Linux reports them. On other systems there is no
+/// limit.
 pub fn available_memory() -> usize {
     bytes_in_proc("/proc/meminfo", "MemAvailable").map_or(usize::MAX, |bytes| bytes as usize)
 }
 
-/// Return the number of bytes on a line of a file of /proc, such as `MemAvailable` of /proc/meminfo; none where there is no such file or line.
+/// Return the number of bytes on a line of a file of /proc, such as `MemAvailable` of /proc/meminfo; none where there
+/// is no such file or line.
 pub fn bytes_in_proc(file: &str, line: &str) -> Option<u64> {
     bytes_on_line(&std::fs::read_to_string(file).ok()?, line)
 }
@@ -122,8 +124,8 @@ impl<R: Read> Read for Digested<R> {
     }
 }
 
-/// Return the SHA-256 of numbers, texts, and lists and tuples of such, in hexadecimal digits. Lengths are part of the digested bytes, so that
-/// different divisions of the same text differ.
+/// Return the SHA-256 of numbers, texts, and lists and tuples of such, in hexadecimal digits. Lengths are part of the
+/// digested bytes, so that different divisions of the same text differ.
 pub fn digest(data: &impl Serialize) -> String {
     // data of these kinds can always be packed
     digest_of_bytes(&postcard::to_allocvec(data).unwrap_or_default())

@@ -1,8 +1,8 @@
 //! Signals that request the program to end.
 //!
-//! A signal ends the program at once where nothing would be lost, with the exit code that a shell uses for it. After [`Interrupt::hold`], the first
-//! signal only sets a flag, and the run checks the flag where it can end properly; a second signal ends the program at
-//! once.
+//! A signal ends the program at once where nothing would be lost, with the exit code that a shell uses for it. After
+//! [`Interrupt::hold`], the first signal only sets a flag, and the run checks the flag where it can end properly; a
+//! second signal ends the program at once.
 //!
 //! The first thread waits for signals, and the work of the program is done in a second one. So a library in which the
 //! work goes on for ever cannot hold a signal up, and one that installs handlers of its own, as METIS does for SIGTERM,
@@ -64,8 +64,8 @@ impl Interrupt {
         }
     }
 
-    /// Install handlers for a signal that another thread takes all the same, as it may where it starts a process. Return
-    /// the signals that end the program.
+    /// Install handlers for a signal that another thread takes all the same, as it may where it starts a process.
+    /// Return the signals that end the program.
     fn install(&self) -> std::io::Result<SigSet> {
         let mut ending = SigSet::empty();
         for signal in ENDING.into_iter().filter(|&signal| signal != SIGHUP || !is_ignored(signal)) {

@@ -102,8 +102,8 @@ impl Exchange for Ranks {
 /// Most bytes of one message: MPI counts them by 31 bits.
 const CHUNK: usize = 1 << 30;
 
-/// Return the owner rank of each body, where `loads` has the load of each body. Whole bodies are assigned, the largest first, each to the rank
-/// with the least load so far.
+/// Return the owner rank of each body, where `loads` has the load of each body. Whole bodies are assigned, the largest
+/// first, each to the rank with the least load so far.
 pub fn owners(loads: &[usize], ranks: usize) -> Vec<usize> {
     let mut order: Vec<usize> = (0..loads.len()).collect();
     order.sort_by_key(|&body| (std::cmp::Reverse(loads[body]), body));
@@ -117,8 +117,8 @@ pub fn owners(loads: &[usize], ranks: usize) -> Vec<usize> {
     owner
 }
 
-/// Make the results of all ranks agree: if one rank failed, all fail, with the error of the lowest rank that has a message. The other ranks get an
-/// error of the same kind without a message, which is not printed. Collective.
+/// Make the results of all ranks agree: if one rank failed, all fail, with the error of the lowest rank that has a
+/// message. The other ranks get an error of the same kind without a message, which is not printed. Collective.
 ///
 /// # Errors
 /// As described.

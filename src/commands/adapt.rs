@@ -1,4 +1,5 @@
-//! The rounds of a run on several meshes, which are adapted to an error: solve, estimate, stop or follow the sizes of the next mesh.
+//! The rounds of a run on several meshes, which are adapted to an error: solve, estimate, stop or follow the sizes of
+//! the next mesh.
 
 use super::checkpoint::{Checkpoint, CheckpointHeader};
 use super::shortfall::Shortfall;
@@ -21,20 +22,25 @@ use crate::scene::{AdaptSpec, Quantity, Scene};
 use std::rc::Rc;
 use std::sync::Arc;
 
-/// Cells of a body's first mesh. A cube with three cells along each edge, six tetrahedra each, has 162; with two it has a single inner node.
+/// Cells of a body's first mesh. A cube with three cells along each edge, six tetrahedra each, has 162; with two it has
+/// a single inner node.
 const FIRST_CELLS: usize = 150;
 
-/// Ratio of the error that the next mesh aims at to the error asked for. An estimate a little too good then costs no further mesh.
+/// Ratio of the error that the next mesh aims at to the error asked for. An estimate a little too good then costs no
+/// further mesh.
 const AIM: f64 = 0.7;
 
-/// Least ratio of the error of the next mesh to the present error. What a coarse mesh shows of a kink does not hold for a very fine one.
+/// Least ratio of the error of the next mesh to the present error. What a coarse mesh shows of a kink does not hold for
+/// a very fine one.
 const LEAST: f64 = 0.1;
 
-/// Least ratio of the cells of a mesh to those of the mesh before. All meshes before the last one then cost no more than that one together.
-/// Gmsh makes about 0.6 of the predicted cells in space, so that the prediction is corrected by what it made of the last one: a T-slot nut of
-/// linear elements takes four meshes to 2e-2, and nine without the correction.
+/// Least ratio of the cells of a mesh to those of the mesh before. All meshes before the last one then cost no more
+/// than that one together. Gmsh makes about 0.6 of the predicted cells in space, so that the prediction is corrected by
+/// what it made of the last one: a T-slot nut of linear elements takes four meshes to 2e-2, and nine without the
+/// correction.
 ///
-/// Meshes with fewer cells do not have the predicted errors where these fall more slowly than h^p, at edges of supports, loads and contact.
+/// Meshes with fewer cells do not have the predicted errors where these fall more slowly than h^p, at edges of
+/// supports, loads and contact.
 const GROWTH: f64 = 2.0;
 
 /// Number of times as many cells from which the cost of a sharp end is not worth it: two further meshes.
@@ -52,18 +58,19 @@ struct Pace {
     power: f64,
 }
 
-/// Power of the energy error with which pressures converge where elements have an order above two and meshes are graded to singular places. `groove-held`
-/// of orders 4 and 6 under layers with a = 1, 0.5 and 0.3 takes 165 000 dofs to 1e-6, all meshes of the six runs together. With powers of 1.2, 1.6 and 2 it takes
-/// 1.30, 1.26 and 1.55 times as many.
+/// Power of the energy error with which pressures converge where elements have an order above two and meshes are graded
+/// to singular places. `groove-held` of orders 4 and 6 under layers with a = 1, 0.5 and 0.3 takes 165 000 dofs to 1e-6,
+/// all meshes of the six runs together. With powers of 1.2, 1.6 and 2 it takes 1.30, 1.26 and 1.55 times as many.
 const NODAL: f64 = 1.4;
 
-/// The same as [`LEAST`] for orders above two. With 0.01, 0.05 and 0.1 the same runs take 1.11, 1.23 and 1.38 times the dofs.
+/// The same as [`LEAST`] for orders above two. With 0.01, 0.05 and 0.1 the same runs take 1.11, 1.23 and 1.38 times the
+/// dofs.
 const STEEPEST: f64 = 0.02;
 
 impl Pace {
-    /// Return the pace for elements of a degree. Above two, most cells lie at singular places, and a mesh that is graded to them may have fewer cells than the
-    /// one before, with a small part of its error. Up to two the error of nodal values is taken to be one order better than that in energy, with elements of
-    /// degree p as h^(p+1) and h^p.
+    /// Return the pace for elements of a degree. Above two, most cells lie at singular places, and a mesh that is
+    /// graded to them may have fewer cells than the one before, with a small part of its error. Up to two the error of
+    /// nodal values is taken to be one order better than that in energy, with elements of degree p as h^(p+1) and h^p.
     fn of(degree: usize) -> Self {
         let p = degree as f64;
         match degree {
@@ -112,7 +119,8 @@ struct MeshError {
 }
 
 impl MeshError {
-    /// Return the number of cells of a mesh whose error is `asked`, if it goes on falling with the number of cells as it did since the mesh `before`.
+    /// Return the number of cells of a mesh whose error is `asked`, if it goes on falling with the number of cells as
+    /// it did since the mesh `before`.
     fn cells_for(&self, before: MeshError, asked: f64) -> f64 {
         let rate = (before.error / self.error).ln() / (self.cells / before.cells).ln();
         if rate > 0.0 { self.cells * (self.error / asked).powf(1.0 / rate) } else { f64::INFINITY }
@@ -120,7 +128,8 @@ impl MeshError {
 }
 
 impl AdaptiveRun {
-    /// Return the plan whose first round is on the scene's own mesh, on a coarse one if meshes are adapted, or on that of a checkpoint.
+    /// Return the plan whose first round is on the scene's own mesh, on a coarse one if meshes are adapted, or on that
+    /// of a checkpoint.
     ///
     /// # Errors
     /// A scene whose mesh cannot follow sizes; what [`run::build`] refuses.
@@ -200,7 +209,8 @@ impl AdaptiveRun {
 
     /// Adapt meshes under the largest load step alone, and leave all steps to the last mesh.
     ///
-    /// A mesh for the largest load serves smaller loads, too, and all steps on every mesh would cost as many times as much.
+    /// A mesh for the largest load serves smaller loads, too, and all steps on every mesh would cost as many times as
+    /// much.
     fn defer_steps(&mut self) {
         let history = &self.scene.method.steps;
         if self.adapts() && !history.is_empty() {
@@ -231,8 +241,8 @@ impl AdaptiveRun {
             .help("let the scene name a Gmsh script: mesh = \"file.geo\""))
     }
 
-    /// Build the scene of this round. Where Gmsh makes no mesh of its sizes, or one that is refused, the run ends with the last mesh, which is built
-    /// once more. Collective.
+    /// Build the scene of this round. Where Gmsh makes no mesh of its sizes, or one that is refused, the run ends with
+    /// the last mesh, which is built once more. Collective.
     ///
     /// # Errors
     /// What [`run::build`] refuses, but not the mesh of a later round.
@@ -270,16 +280,18 @@ impl AdaptiveRun {
         }
     }
 
-    /// Return the start of this round, if an earlier round gives it: `flange` to 5e-2 takes 10 steps on its four meshes, and 18 with automatic starts.
+    /// Return the start of this round, if an earlier round gives it: `flange` to 5e-2 takes 10 steps on its four
+    /// meshes, and 18 with automatic starts.
     fn start(&self, built: &Built) -> Option<InitialGuess> {
         let Built { scene, discrete, .. } = built;
         let newton = matches!(scene.method.name, MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin);
-        (!self.start_from.is_empty()).then(|| match newton {
-            true => {
+        (!self.start_from.is_empty()).then(|| {
+            if newton {
                 let compression = discrete.model.compressions_of(&transfer::pressure(&self.start_from, discrete));
                 InitialGuess::Known(Box::new(Solution { compression, ..Solution::default() }))
+            } else {
+                InitialGuess::Trace(transfer::trace(&self.start_from, discrete))
             }
-            false => InitialGuess::Trace(transfer::trace(&self.start_from, discrete)),
         })
     }
 
@@ -335,10 +347,12 @@ impl AdaptiveRun {
         (!is_full).then_some(next)
     }
 
-    /// Return whether only sharp ends of contacts are left of an error, which meshes of a few times as many cells do not reach there.
+    /// Return whether only sharp ends of contacts are left of an error, which meshes of a few times as many cells do
+    /// not reach there.
     ///
-    /// Without a layer the pressure is K r^(lambda - 1) at the distance r from the end, and facets of size h miss the order h^(lambda - 1/2) of it. A
-    /// punch with right angles has lambda = 0.774: a half of the error takes facets of a thirteenth.
+    /// Without a layer the pressure is K r^(lambda - 1) at the distance r from the end, and facets of size h miss the
+    /// order h^(lambda - 1/2) of it. A punch with right angles has lambda = 0.774: a half of the error takes facets of
+    /// a thirteenth.
     fn has_costly_ends(&mut self, estimate: &Estimate, goal: &AdaptSpec) -> bool {
         if !matches!(goal.of, Quantity::All | Quantity::Pressures) {
             return false;
@@ -352,9 +366,10 @@ impl AdaptiveRun {
         if needed <= COSTLY * cells {
             return false;
         }
-        let meshes = match needed < 1e9 {
-            true => format!("takes a mesh of about {needed:.0e} cells"),
-            false => "takes more cells than a mesh can have".to_owned(),
+        let meshes = if needed < 1e9 {
+            format!("takes a mesh of about {needed:.0e} cells")
+        } else {
+            "takes more cells than a mesh can have".to_owned()
         };
         let ends: Vec<String> = self.unmet.iter().map(UnmetReport::in_words).collect();
         self.shortfall = Some(Shortfall::SharpEnds(format!(
@@ -365,8 +380,9 @@ impl AdaptiveRun {
         true
     }
 
-    /// Return what the error asked for will take, as a line for the terminal, once three meshes show how the error falls with the cells; none if it does
-    /// not fall. The seconds are those of the last mesh in proportion to its cells.
+    /// Return what the error asked for will take, as a line for the terminal, once three meshes show how the error
+    /// falls with the cells; none if it does not fall. The seconds are those of the last mesh in proportion to its
+    /// cells.
     pub fn forecast(&self) -> Option<String> {
         let goal = self.goal.as_ref()?;
         let [.., first, _, last] = &self.rounds[..] else { return None };
@@ -384,9 +400,10 @@ impl AdaptiveRun {
         if !cells.is_finite() {
             return None;
         }
-        let limit = match cells > goal.cells as f64 {
-            true => format!(", more than adapt.cells = {} allows", goal.cells),
-            false => format!(" and {:.0} s", last.seconds * cells / last.cells as f64),
+        let limit = if cells > goal.cells as f64 {
+            format!(", more than adapt.cells = {} allows", goal.cells)
+        } else {
+            format!(" and {:.0} s", last.seconds * cells / last.cells as f64)
         };
         Some(format!("  an error of {asked:e} takes about {cells:.0e} cells{limit}"))
     }

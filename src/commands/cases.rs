@@ -105,8 +105,8 @@ impl Plan {
         Self { columns, cases: Vec::new() }
     }
 
-    /// Add all combinations of the axes of a scene, whose names are the columns. Overrides and PETSc options for all cases come before those of
-    /// the values.
+    /// Add all combinations of the axes of a scene, whose names are the columns. Overrides and PETSc options for all
+    /// cases come before those of the values.
     pub fn add(&mut self, scene: PathBuf, axes: &[Axis], overrides: &[String], petsc: &[String]) {
         let first = Case { scene, key: vec![], label: String::new(), overrides: overrides.into(), petsc: petsc.into() };
         let with = |case: &Case, value: &AxisValue| Case {
@@ -157,8 +157,8 @@ impl Plan {
         columns.iter().map(|&column| self.part(column, &key[column])).collect::<Vec<_>>().join(", ")
     }
 
-    /// Return a value with the last word of its column, or with the whole name where two columns have the same last word. Scenes, solvers and
-    /// methods need no name.
+    /// Return a value with the last word of its column, or with the whole name where two columns have the same last
+    /// word. Scenes, solvers and methods need no name.
     fn part(&self, column: usize, value: &str) -> String {
         let name = &self.columns[column];
         let last = |name: &str| name.rsplit('.').next().unwrap_or(name).to_owned();

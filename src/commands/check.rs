@@ -19,7 +19,8 @@ pub struct CheckArgs {
     scene: SceneArgs,
 }
 
-/// Build a scene's problem, print it and return the exit code: that of `solve` if loads work on a motion that nothing can hold.
+/// Build a scene's problem, print it and return the exit code: that of `solve` if loads work on a motion that nothing
+/// can hold.
 ///
 /// Bodies, dofs, surfaces, gaps and the unconstrained rigid motions of each body are printed.
 ///

@@ -1,8 +1,9 @@
 //! Checkpoints: files with the states from which another process, on any number of ranks, goes on with a run.
 //!
-//! The file `checkpoint` has a line that names its format, a line of JSON (the head), numbers as `postcard` writes them, and the SHA-256 of
-//! all that. It is replaced as a whole, so that there is always a good one. The states are compressions of the layers and traces of the bodies, in the
-//! units of the scene: Newton's method starts from the former, sweeps from the latter.
+//! The file `checkpoint` has a line that names its format, a line of JSON (the head), numbers as `postcard` writes
+//! them, and the SHA-256 of all that. It is replaced as a whole, so that there is always a good one. The states are
+//! compressions of the layers and traces of the bodies, in the units of the scene: Newton's method starts from the
+//! former, sweeps from the latter.
 
 use super::shortfall::Shortfall;
 use crate::ddm::{InitialGuess, Solution, Status};
@@ -45,7 +46,8 @@ pub struct CheckpointHeader {
     pub adapted: Option<AdaptedMesh>,
     /// Reports of the load steps that have ended.
     pub steps: Vec<StepReport>,
-    /// Whether the run ends with this mesh of an adaptation: it makes all load steps on it, or it is the best mesh once more.
+    /// Whether the run ends with this mesh of an adaptation: it makes all load steps on it, or it is the best mesh once
+    /// more.
     pub on_last_mesh: bool,
     /// Why the error was not reached on the last mesh, if it was not.
     pub shortfall: Option<Shortfall>,
@@ -137,8 +139,9 @@ fn parse(path: &Path, bytes: &[u8]) -> Option<Checkpoint> {
     Some(Checkpoint { path: path.to_owned(), head, trace, compression })
 }
 
-/// Return a digest of a scene without output, solvers and method (but for its load steps), of the file of the mesh, and of the bodies and contact points
-/// made from it, on the rank that has read the mesh. The file counts because nodes, cells and groups may differ where their numbers are the same.
+/// Return a digest of a scene without output, solvers and method (but for its load steps), of the file of the mesh, and
+/// of the bodies and contact points made from it, on the rank that has read the mesh. The file counts because nodes,
+/// cells and groups may differ where their numbers are the same.
 fn problem_digest(scene: &Scene, Built { file, discrete, .. }: &Built) -> String {
     let mut problem = scene.problem();
     problem["method"] = problem["method"]["steps"].take();

@@ -11,16 +11,18 @@ pub type Weights = Vec<(usize, f64)>;
 /// Scattered points in a search tree, each with its index.
 pub struct PointTree(RTree<GeomWithData<[f64; 3], usize>>);
 
-/// Number of points that a linear function is fitted to. Four points determine the function, a constant and three slopes; twice as many leave the
-/// fit determined where half of them lie on a line or have nearly one place.
+/// Number of points that a linear function is fitted to. Four points determine the function, a constant and three
+/// slopes; twice as many leave the fit determined where half of them lie on a line or have nearly one place.
 const NEAREST: usize = 8;
 
-/// Weight of the slopes for a plane that follows the values. Weights of points are one at least, so that it changes a fitted value by the relative
-/// amount 1e-6^2, which is below the last digit in tables. Points of a plane determine no slope across it, and this weight makes that slope zero.
+/// Weight of the slopes for a plane that follows the values. Weights of points are one at least, so that it changes a
+/// fitted value by the relative amount 1e-6^2, which is below the last digit in tables. Points of a plane determine no
+/// slope across it, and this weight makes that slope zero.
 pub const EXACT: f64 = 1e-6;
 
-/// Weight of the slopes for a plane that tends to the values of the nearest points. Weights of points are one at least, so that the slopes have a
-/// hundredth of their part in the sum of squares. Rounding of the surface's coordinates then causes no slope across the surface.
+/// Weight of the slopes for a plane that tends to the values of the nearest points. Weights of points are one at least,
+/// so that the slopes have a hundredth of their part in the sum of squares. Rounding of the surface's coordinates then
+/// causes no slope across the surface.
 pub const DAMPED: f64 = 0.1;
 
 impl PointTree {
@@ -39,10 +41,11 @@ impl PointTree {
         weights
     }
 
-    /// Return the weights of the values of the nearest points in the value at a point of the linear function that is fitted to them.
+    /// Return the weights of the values of the nearest points in the value at a point of the linear function that is
+    /// fitted to them.
     ///
-    /// The fit minimises the sum of squared misfits, each weighted by the inverse distance to the fourth. The weight `slopes` holds the slopes
-    /// near zero; the weights of the points are one at least.
+    /// The fit minimises the sum of squared misfits, each weighted by the inverse distance to the fourth. The weight
+    /// `slopes` holds the slopes near zero; the weights of the points are one at least.
     pub fn plane(&self, at: &[f64; 3], slopes: f64) -> Weights {
         let nearest: Vec<_> = self.0.nearest_neighbor_iter_with_distance_2(*at).take(NEAREST).collect();
         let far = nearest.last().map_or(0.0, |(_, squared)| squared.sqrt());
@@ -63,8 +66,9 @@ impl PointTree {
     }
 }
 
-/// Return the weights of the values of an edge's points in the value at a point of the polynomial through them, and of that through all but the middle one.
-/// The edge is the nearest one of `edges`, each the indices of its `points`. The polynomials are those of the way along its chord.
+/// Return the weights of the values of an edge's points in the value at a point of the polynomial through them, and of
+/// that through all but the middle one. The edge is the nearest one of `edges`, each the indices of its `points`. The
+/// polynomials are those of the way along its chord.
 ///
 /// A solution may have a kink where edges meet, so that no polynomial goes through the points of two edges.
 pub fn on_edge(points: &[[f64; 3]], edges: &[Vec<usize>], at: &[f64; 3]) -> [Weights; 2] {
@@ -104,7 +108,8 @@ pub fn mean(weights: &[(usize, f64)], column: &[f64]) -> f64 {
     weights.iter().map(|(near, weight)| weight * column[*near]).sum()
 }
 
-/// Return the fitted value, clamped to the range of the values that it is fitted to: where all points lie to one side, a plane may lead anywhere.
+/// Return the fitted value, clamped to the range of the values that it is fitted to: where all points lie to one side,
+/// a plane may lead anywhere.
 pub fn clamped_mean(weights: &[(usize, f64)], column: &[f64]) -> f64 {
     let [least, most] = range(weights.iter().map(|(near, _)| column[*near]));
     mean(weights, column).clamp(least, most)
@@ -118,7 +123,8 @@ pub struct Squares {
     new: f64,
 }
 
-/// The L2 norms of an old function, a new function, and their difference. The old function is that of the reference or of the earlier mesh.
+/// The L2 norms of an old function, a new function, and their difference. The old function is that of the reference or
+/// of the earlier mesh.
 #[derive(Debug, Clone, Copy)]
 pub struct L2Norms {
     /// The norm of the new function less the old one.
@@ -147,7 +153,8 @@ impl Squares {
 mod tests {
     use super::*;
 
-    /// A polynomial of the degree is met on each of two edges with a kink between them, and one of a degree less without the middle points.
+    /// A polynomial of the degree is met on each of two edges with a kink between them, and one of a degree less
+    /// without the middle points.
     #[test]
     fn polynomials_of_edges_are_met() {
         let places = [0.0, 0.3, 0.05, 0.14, 0.26, 1.0, 0.37, 0.5, 0.82];

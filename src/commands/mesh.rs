@@ -83,22 +83,23 @@ struct GroupFacts {
 /// # Errors
 /// Refusals of scene and mesh, a body without cells, a file that cannot be written.
 pub fn mesh(interrupt: &Interrupt, request: &MeshArgs) -> Result<i32> {
-    let facts = match request.scene.extension().is_none_or(|ending| ending == "toml") {
-        true => {
-            let scene = crate::scene::load(&request.scene, &request.overrides)?;
-            let of_scene = if scene.dimension.value == 2 { facts::<2> } else { facts::<3> };
-            of_scene(&scene.mesh, Some(&scene), interrupt, request)?
-        }
-        false => of_file(interrupt, request)?,
+    let facts = if request.scene.extension().is_none_or(|ending| ending == "toml") {
+        let scene = crate::scene::load(&request.scene, &request.overrides)?;
+        let of_scene = if scene.dimension.value == 2 { facts::<2> } else { facts::<3> };
+        of_scene(&scene.mesh, Some(&scene), interrupt, request)?
+    } else {
+        of_file(interrupt, request)?
     };
-    match request.json {
-        true => say(format_args!("{:#}", serde_json::json!(facts)))?,
-        false => say(in_lines(&facts))?,
+    if request.json {
+        say(format_args!("{:#}", serde_json::json!(facts)))?
+    } else {
+        say(in_lines(&facts))?
     }
     Ok(0)
 }
 
-/// Return the facts of a mesh, or of a shape or script that Gmsh meshes: in space, or in the plane where it has no cells in space.
+/// Return the facts of a mesh, or of a shape or script that Gmsh meshes: in space, or in the plane where it has no
+/// cells in space.
 fn of_file(interrupt: &Interrupt, request: &MeshArgs) -> Result<MeshFacts> {
     if let Some(set) = request.overrides.first() {
         return Err(Error::new(

@@ -68,7 +68,8 @@ impl Terminal {
         self.is_first && !self.json && !self.is_quiet
     }
 
-    /// Return the lines of `--verbose` to be printed on this rank: what was decided and why, and the PETSc options of each body. Collective.
+    /// Return the lines of `--verbose` to be printed on this rank: what was decided and why, and the PETSc options of
+    /// each body. Collective.
     fn decisions(&self, session: &Session, ready: &Prepared) -> Result<Vec<String>> {
         if !self.is_verbose {
             return Ok(Vec::new());
@@ -117,8 +118,8 @@ pub struct SceneArgs {
     /// Estimate the error of the discretisation (short for --set estimate=true)
     #[arg(long)]
     estimate: bool,
-    /// Adapt the mesh until the estimated errors of pressures and displacements, or of what adapt.of says, are at most this (short for --set
-    /// adapt.error=E)
+    /// Adapt the mesh until the estimated errors of pressures and displacements, or of what adapt.of says, are at most
+    /// this (short for --set adapt.error=E)
     #[arg(long, value_name = "E", allow_hyphen_values = true)]
     tolerance: Option<String>,
     /// Print the report as JSON
@@ -192,7 +193,8 @@ fn clock_with_phases(is_shown: bool) -> Clock {
     clock
 }
 
-/// Return the line for the phase that follows the one that has ended. `estimate` is its expected time in seconds, if that is known.
+/// Return the line for the phase that follows the one that has ended. `estimate` is its expected time in seconds, if
+/// that is known.
 fn line_after(ended: &str, estimate: Option<f64>) -> Option<ProgressLine> {
     match ended {
         "" => Some(ProgressLine::new("mesh", None)),

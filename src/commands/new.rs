@@ -16,7 +16,8 @@ pub const SPACE: Example = [include_str!("new/space.toml"), include_str!("new/sp
 /// Two cylinders as bodies of revolution.
 pub const REVOLUTION: Example = [include_str!("new/revolution.toml"), include_str!("new/revolution.geo")];
 
-/// Write a scene and its script into `folder`, whose last word names the scene, and return the exit code. Existing files are not replaced.
+/// Write a scene and its script into `folder`, whose last word names the scene, and return the exit code. Existing
+/// files are not replaced.
 ///
 /// # Errors
 /// A folder without a name or with one that is no file name, files that exist or cannot be written.

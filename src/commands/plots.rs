@@ -33,7 +33,8 @@ pub struct Plots {
 }
 
 impl Plots {
-    /// Add a run. Pressures of the `shown` pairs are plotted only along curves: points of a surface over one coordinate would be a cloud.
+    /// Add a run. Pressures of the `shown` pairs are plotted only along curves: points of a surface over one coordinate
+    /// would be a cloud.
     pub fn add(&mut self, label: &str, done: &Done, shown: &[usize]) {
         let pairs = &done.model().pairs;
         if self.histories.is_empty() {
@@ -141,7 +142,8 @@ pub fn unit_words(scene: &Scene) -> UnitWords {
     })
 }
 
-/// Return the plot of the contact force of the `shown` pairs over their approach, if the run has several load steps. A single curve has no name.
+/// Return the plot of the contact force of the `shown` pairs over their approach, if the run has several load steps. A
+/// single curve has no name.
 pub fn approaches(done: &Done, shown: &[usize]) -> Option<Plot> {
     let (names, steps) = (results::pair_names(&done.built), &done.steps);
     let curve = |&i: &usize| {
@@ -159,8 +161,8 @@ pub fn approaches(done: &Done, shown: &[usize]) -> Option<Plot> {
     })
 }
 
-/// Return the plot of pressures along pair `i` in the units of the scene, with the curve of its reference alone. Among several pairs each has the names of
-/// its surfaces.
+/// Return the plot of pressures along pair `i` in the units of the scene, with the curve of its reference alone. Among
+/// several pairs each has the names of its surfaces.
 fn pressure_plot(done: &Done, i: usize) -> Plot {
     let (scene, pairs) = (&done.built.scene, &done.model().pairs);
     let title = match pairs.len() {

@@ -28,8 +28,8 @@ pub struct Row {
     pub f1: Option<f64>,
     /// Largest pressure of all pairs.
     pub peak_pressure: Option<f64>,
-    /// Wall seconds: of the process in `bench`, of the run in `sweep`; then those of its phases, and the parts of set-up and iteration in
-    /// factorisations and solves, summed over the bodies.
+    /// Wall seconds: of the process in `bench`, of the run in `sweep`; then those of its phases, and the parts of
+    /// set-up and iteration in factorisations and solves, summed over the bodies.
     pub seconds: Option<f64>,
     pub mesh_seconds: Option<f64>,
     pub discretize_seconds: Option<f64>,
@@ -39,12 +39,14 @@ pub struct Row {
     pub solve_seconds: Option<f64>,
     /// Peak resident memory, 10^6 bytes: of the largest process in `bench`, so far in `sweep`.
     pub memory_mb: Option<f64>,
-    /// Errors of the displacements against `exact`, the largest of the bodies; relative error in L2, and what it is measured in and against.
+    /// Errors of the displacements against `exact`, the largest of the bodies; relative error in L2, and what it is
+    /// measured in and against.
     pub error_h1: Option<f64>,
     pub error_energy: Option<f64>,
     pub error: Option<f64>,
     pub error_of: String,
-    /// Runs of the case in `bench`, CPU seconds of all ranks, and the largest less the shortest wall time over the median.
+    /// Runs of the case in `bench`, CPU seconds of all ranks, and the largest less the shortest wall time over the
+    /// median.
     pub runs: usize,
     pub cpu_seconds: Option<f64>,
     pub spread: Option<f64>,
@@ -136,9 +138,8 @@ pub fn aligned(rows: &[Vec<String>], left: usize) -> String {
     let count = rows.first().map_or(0, Vec::len);
     let width = |k: usize| rows.iter().map(|row| row[k].chars().count()).max().unwrap_or(0);
     let widths: Vec<usize> = (0..count).map(width).collect();
-    let cell = |(k, text): (usize, &String)| match k < left {
-        true => format!("{text:<0$}", widths[k]),
-        false => format!("{text:>0$}", widths[k]),
+    let cell = |(k, text): (usize, &String)| {
+        if k < left { format!("{text:<0$}", widths[k]) } else { format!("{text:>0$}", widths[k]) }
     };
     let line = |row: &Vec<String>| row.iter().enumerate().map(cell).collect::<Vec<_>>().join("  ");
     rows.iter().map(|row| line(row).trim_end().to_owned()).collect::<Vec<_>>().join("\n")

@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 pub enum Shortfall {
     /// A limit of meshes or cells, or of Gmsh.
     Limit(String),
-    /// Pressures are singular at sharp ends of contacts, where meshes of a few times as many cells do not reach it. All other errors are small enough.
+    /// Pressures are singular at sharp ends of contacts, where meshes of a few times as many cells do not reach it. All
+    /// other errors are small enough.
     SharpEnds(String),
 }
 

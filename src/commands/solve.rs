@@ -55,8 +55,8 @@ impl SolveArgs {
 /// Solve a scene, write its results and return the exit code.
 ///
 /// # Errors
-/// Everything that keeps the run from starting, and failures of the file system. A run that does not converge is no error: it has an exit code
-/// of its own, and all that was computed is written.
+/// Everything that keeps the run from starting, and failures of the file system. A run that does not converge is no
+/// error: it has an exit code of its own, and all that was computed is written.
 pub fn solve(session: &Session, interrupt: &Interrupt, request: &SolveArgs) -> Result<i32> {
     let terminal = Terminal::new(session, &request.scene, &request.verbosity);
     let mut clock = clock_with_phases(terminal.is_loud());
@@ -98,8 +98,8 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: &SolveArgs) -> R
     solver.finish(last)
 }
 
-/// The state of the command over its rounds, one for each mesh. It is the observer of each round: it writes iterations and load steps to the
-/// terminal and to tables, passes signals on, and writes checkpoints.
+/// The state of the command over its rounds, one for each mesh. It is the observer of each round: it writes iterations
+/// and load steps to the terminal and to tables, passes signals on, and writes checkpoints.
 struct Solver<'s> {
     session: &'s Session,
     interrupt: &'s Interrupt,
@@ -155,7 +155,8 @@ impl Solver<'_> {
         Ok(Round { done, estimate })
     }
 
-    /// Open the tables of a round, before the first one of which the folder loses the results of other runs: nothing can be refused any more.
+    /// Open the tables of a round, before the first one of which the folder loses the results of other runs: nothing
+    /// can be refused any more.
     fn open_tables(&mut self, ready: &Prepared) -> Result<()> {
         if !self.terminal.is_first {
             return Ok(());
@@ -168,7 +169,8 @@ impl Solver<'_> {
         Ok(())
     }
 
-    /// Print a line for each adapted mesh that has ended, and what the error asked for will take if another one follows.
+    /// Print a line for each adapted mesh that has ended, and what the error asked for will take if another one
+    /// follows.
     fn print_meshes(&mut self, goes_on: bool) -> Result<()> {
         let rounds = &self.plan.rounds;
         if !self.terminal.is_loud() || rounds.is_empty() {
@@ -187,9 +189,10 @@ impl Solver<'_> {
 
     /// Write the results of a mesh that is not the last, so that they exist whatever happens on the next mesh.
     fn write_round(&mut self, Round { done, estimate }: Round) {
-        let ended = match self.plan.is_stepping() {
-            true => "ended while load steps were at work on the last mesh",
-            false => "ended while the next mesh was at work: the error asked for is not reached",
+        let ended = if self.plan.is_stepping() {
+            "ended while load steps were at work on the last mesh"
+        } else {
+            "ended while the next mesh was at work: the error asked for is not reached"
         };
         let mut clock = self.clock.clone();
         let (_, written) = self.files(&done, estimate.as_ref(), false).write(&mut clock, |report| {
@@ -258,7 +261,8 @@ fn brief_summary(report: &Report, code: i32, results: &str) -> String {
     ended.into_iter().chain(warnings).chain([results.to_owned()]).collect::<Vec<_>>().join("\n")
 }
 
-/// Take the folder of results for a run of these scenes, which writes files of these names. The first rank, which writes its tables, locks it.
+/// Take the folder of results for a run of these scenes, which writes files of these names. The first rank, which
+/// writes its tables, locks it.
 pub(super) fn claim(session: &Session, path: PathBuf, scenes: &[Rc<Scene>], names: Vec<String>) -> Result<Folder> {
     if session.rank() > 0 {
         return Folder::create(path);
@@ -270,8 +274,8 @@ pub(super) fn claim(session: &Session, path: PathBuf, scenes: &[Rc<Scene>], name
 
 /// Remove the results of other runs from the folder.
 ///
-/// If this run `goes_on` from the checkpoint in the folder, the results are its own and stay. Another checkpoint is renamed, since hours of work
-/// may be in it.
+/// If this run `goes_on` from the checkpoint in the folder, the results are its own and stay. Another checkpoint is
+/// renamed, since hours of work may be in it.
 fn prepare_folder(folder: &Folder, goes_on: bool) -> Result<()> {
     if goes_on {
         return Ok(());

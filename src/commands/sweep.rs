@@ -1,5 +1,5 @@
-//! `winkler sweep`: solve a scene for every combination of values of its keys in one process, one row of a table for each run.
-//! A run takes over what it can from the run before it.
+//! `winkler sweep`: solve a scene for every combination of values of its keys in one process, one row of a table for
+//! each run. A run takes over what it can from the run before it.
 
 use super::cases::{Axis, Case, Plan};
 use super::plots::Plots;
@@ -38,7 +38,8 @@ pub struct SweepArgs {
 /// Solve a scene for every combination of values, and write `sweep.csv`, `history.csv`, `convergence.svg` and
 /// `pressure.svg`.
 ///
-/// Return the exit code: that of a run that did not converge, if there is one. A signal ends the sweep with the run under way.
+/// Return the exit code: that of a run that did not converge, if there is one. A signal ends the sweep with the run
+/// under way.
 ///
 /// # Errors
 /// Refusals of any scene of the sweep, before the first run; failures of the file system.
@@ -101,7 +102,8 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &SweepArgs) -> R
     Ok(exit)
 }
 
-/// Refuse scenes that are to be adapted: a sweep solves each on its own mesh, and a loose tolerance of the iteration would be all that is left.
+/// Refuse scenes that are to be adapted: a sweep solves each on its own mesh, and a loose tolerance of the iteration
+/// would be all that is left.
 fn without_adaptation(scenes: Vec<Rc<Scene>>) -> Result<Vec<Rc<Scene>>> {
     if scenes.iter().all(|scene| scene.adapt.is_none()) {
         return Ok(scenes);

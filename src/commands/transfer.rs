@@ -1,4 +1,5 @@
-//! Solutions on two meshes: the start of an iteration from the solution on another mesh, and the error of the later one, checked by the earlier one.
+//! Solutions on two meshes: the start of an iteration from the solution on another mesh, and the error of the later
+//! one, checked by the earlier one.
 
 use super::interpolate::{DAMPED, L2Norms, PointTree, Squares, Weights, clamped_mean, mean, on_edge};
 use crate::contact::ContactPair;
@@ -6,7 +7,8 @@ use crate::discretize::Discrete;
 use crate::estimate::Estimate;
 use crate::output::ContactTable;
 
-/// Return the trace on a new mesh (layout of a trace vector) of a solution that is given by its contact tables, one for each pair.
+/// Return the trace on a new mesh (layout of a trace vector) of a solution that is given by its contact tables, one for
+/// each pair.
 pub fn trace(tables: &[ContactTable], discrete: &Discrete) -> Vec<f64> {
     let model = &discrete.model;
     let points = model.points();
@@ -22,7 +24,8 @@ pub fn trace(tables: &[ContactTable], discrete: &Discrete) -> Vec<f64> {
     trace
 }
 
-/// Return the pressures at the contact points of a new mesh. A point is open if the points around it in the table are mostly open.
+/// Return the pressures at the contact points of a new mesh. A point is open if the points around it in the table are
+/// mostly open.
 pub fn pressure(tables: &[ContactTable], discrete: &Discrete) -> Vec<f64> {
     let mut pressure = Vec::new();
     for (pair, table) in discrete.model.pairs.iter().zip(tables) {
@@ -69,9 +72,9 @@ impl EstimatedSolution {
 
     /// Correct the estimate of the next mesh, whose solution is `tables`, by the difference of both solutions.
     ///
-    /// If the error e of the next mesh and the error e' of this mesh are right, the solutions differ by e + e' at most. Where they differ by more,
-    /// at least one of them is too small, and e is multiplied by the ratio. Pairs that are found automatically may differ between meshes; then
-    /// nothing is compared.
+    /// If the error e of the next mesh and the error e' of this mesh are right, the solutions differ by e + e' at most.
+    /// Where they differ by more, at least one of them is too small, and e is multiplied by the ratio. Pairs that are
+    /// found automatically may differ between meshes; then nothing is compared.
     ///
     /// `edges` are those of the next mesh, one entry for each pair.
     pub fn correct(&self, tables: &[ContactTable], edges: &[Edges], estimate: &mut Estimate) {
@@ -152,8 +155,8 @@ impl Interpolation {
 
     /// Return the value in the column that is nearest to `old` within its uncertainty.
     ///
-    /// Beside a singular place, pressures of high order are much nearer to the exact ones at their points than between them. The difference of both
-    /// polynomials shows by how much.
+    /// Beside a singular place, pressures of high order are much nearer to the exact ones at their points than between
+    /// them. The difference of both polynomials shows by how much.
     fn nearest(&self, column: &[f64], old: f64) -> f64 {
         match self {
             Self::Plane(weights) => clamped_mean(weights, column),
@@ -177,7 +180,8 @@ mod tests {
         assert_eq!([excess(&norms(0.1), 0.0, 0.0), excess(&norms(f64::NAN), 0.1, 0.1)], [1.0, 1.0]);
     }
 
-    /// The solutions differ by 0.1/1.1 of the later one. Errors that explain this stay, and those that do not are raised by the same factor.
+    /// The solutions differ by 0.1/1.1 of the later one. Errors that explain this stay, and those that do not are
+    /// raised by the same factor.
     #[test]
     fn errors_explain_the_difference_of_two_meshes() {
         let corrected = |of_earlier: f64| {
@@ -201,7 +205,8 @@ mod tests {
         assert!((corrected(0.02) - raised).abs() < 1e-12, "{} {raised}", corrected(0.02));
     }
 
-    /// A grid of n x n points on the unit square, with pressures and displacements that are linear functions, times a factor.
+    /// A grid of n x n points on the unit square, with pressures and displacements that are linear functions, times a
+    /// factor.
     fn table(n: usize, factor: f64) -> ContactTable {
         let points: Vec<[f64; 3]> =
             (0..n * n).map(|q| [(q % n) as f64, (q / n) as f64, 0.0].map(|x| x / (n - 1) as f64)).collect();

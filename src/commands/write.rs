@@ -1,4 +1,5 @@
-//! The files of the results of a run: tables, plots, fields, those of each load step included, the page, and the report, which lists all files.
+//! The files of the results of a run: tables, plots, fields, those of each load step included, the page, and the
+//! report, which lists all files.
 
 use super::adapt::AdaptiveRun;
 use super::checkpoint;
@@ -38,8 +39,8 @@ pub struct ResultFiles<'a> {
 impl ResultFiles<'_> {
     /// Write tables, plots, fields and the page, and last the report with the names of all files.
     ///
-    /// A file that cannot be written does not keep the others from being written. Return the report, changed by `change`, and the first
-    /// failure. Collective.
+    /// A file that cannot be written does not keep the others from being written. Return the report, changed by
+    /// `change`, and the first failure. Collective.
     pub fn write(&self, clock: &mut Clock, change: impl Fn(&mut Report)) -> (Report, Result<()>) {
         let _stage = self.session.stage("output");
         let Self { session, folder, done, .. } = *self;
@@ -80,7 +81,8 @@ impl ResultFiles<'_> {
         (report, failed.map_or(written, Err))
     }
 
-    /// Write the table of all pairs, a table for each of the pairs that are shown, and the plots if the scene wants them.
+    /// Write the table of all pairs, a table for each of the pairs that are shown, and the plots if the scene wants
+    /// them.
     fn tables_and_plots(&self, report: &Report, shown: &[usize], plots: &Plots) -> Result<()> {
         let (folder, done) = (self.folder, self.done);
         let has_plots = done.built.scene.output.plots;
@@ -255,7 +257,8 @@ fn stem_of(name: &str, step: usize, steps: usize) -> String {
     format!("{STEPS}/{}-{step:0digits$}", safe_name(name))
 }
 
-/// Return `contact-<a>-<b>` for each pair, safe as a file name, with a number from the second pair of the same bodies on.
+/// Return `contact-<a>-<b>` for each pair, safe as a file name, with a number from the second pair of the same bodies
+/// on.
 pub fn stems(built: &Built) -> Vec<String> {
     pair_names(built).into_iter().map(|name| format!("contact-{}", safe_name(&name))).collect()
 }
@@ -273,7 +276,8 @@ fn ending(info: &BodyInfo) -> &'static str {
     if info.ranks.len() == 1 { "vtu" } else { "pvtu" }
 }
 
-/// Return the names that the files of fields of all ranks have or would have. `stem` returns the name of a file without its ending.
+/// Return the names that the files of fields of all ranks have or would have. `stem` returns the name of a file without
+/// its ending.
 fn field_files(built: &Built, stem: &dyn Fn(&str) -> String) -> Vec<String> {
     let mut files = Vec::new();
     for info in &built.discrete.bodies {
@@ -291,8 +295,8 @@ fn names(done: &Done) -> Vec<String> {
     bodies.chain(stems(&done.built)).collect()
 }
 
-/// Write the fields at the end of a run or, before that, of the load step that has ended. Each rank writes its parts of bodies; the first rank also
-/// writes the contact surfaces and the files that join parts.
+/// Write the fields at the end of a run or, before that, of the load step that has ended. Each rank writes its parts of
+/// bodies; the first rank also writes the contact surfaces and the files that join parts.
 pub fn write_fields(done: &Done, recovered: &All, folder: &Folder, ended: bool) -> Result<()> {
     let (output, step, steps) = (&done.built.scene.output, done.steps.len(), done.built.scene.method.steps.steps.len());
     let has_views = ended && output.msh;
@@ -371,7 +375,8 @@ fn fields(
     Ok(())
 }
 
-/// Write the collection of all steps so far, on the first rank. If `ended`, the files of the last step are in the folder of results itself.
+/// Write the collection of all steps so far, on the first rank. If `ended`, the files of the last step are in the
+/// folder of results itself.
 fn collection(done: &Done, folder: &Folder, ended: bool) -> Result<()> {
     if done.model().exchange.rank() != 0 {
         return Ok(());
@@ -383,10 +388,7 @@ fn collection(done: &Done, folder: &Folder, ended: bool) -> Result<()> {
     for step in 0..done.steps.len().max(1) {
         let is_last = step + 1 >= done.steps.len();
         for (part, name) in names.iter().enumerate() {
-            let stem = match is_last && ended {
-                true => safe_name(name),
-                false => stem_of(name, step + 1, history.len()),
-            };
+            let stem = if is_last && ended { safe_name(name) } else { stem_of(name, step + 1, history.len()) };
             let usual = bodies.get(part).map_or("vtu", ending);
             // steps of another process may have been on more ranks or fewer, and their files may be in another folder
             let exists = |ending: &&str| is_last || folder.path().join(format!("{stem}.{ending}")).is_file();

@@ -1,4 +1,5 @@
-//! The pressure functions mu_q on one facet: which of its nodes carry a pressure, and how means around them are weighted.
+//! The pressure functions mu_q on one facet: which of its nodes carry a pressure, and how means around them are
+//! weighted.
 
 use super::pieces::IntegrationPoint;
 use crate::fem::element::{self, EDGES, Values};
@@ -17,7 +18,8 @@ pub enum Carriers {
     Vertices,
     /// The mid-edges of a quadratic triangle.
     MidEdges,
-    /// Nodes of an edge of order three or more, or of order two on an axis of revolution, moved to the covered part of it.
+    /// Nodes of an edge of order three or more, or of order two on an axis of revolution, moved to the covered part of
+    /// it.
     Part(Part),
 }
 
@@ -31,8 +33,8 @@ pub struct Part {
 }
 
 impl Carriers {
-    /// Return the functions that interpolate values at the carriers, at barycentric point `l` of the facet, one entry a local
-    /// node. Nodes that carry nothing have zero. Between mid-edges the interpolation is linear on each facet.
+    /// Return the functions that interpolate values at the carriers, at barycentric point `l` of the facet, one entry a
+    /// local node. Nodes that carry nothing have zero. Between mid-edges the interpolation is linear on each facet.
     pub fn interpolation<const D: usize>(self, order: Order, l: &[f64; D]) -> Values {
         match self {
             Self::Nodes => element::values(order, l),
@@ -54,7 +56,8 @@ impl Carriers {
 }
 
 impl Part {
-    /// Return the part of an edge that these integration points cover: from the first to the last piece, which reach beyond their outer Gauss points.
+    /// Return the part of an edge that these integration points cover: from the first to the last piece, which reach
+    /// beyond their outer Gauss points.
     fn covered<const D: usize>(chunk: &[IntegrationPoint<D>]) -> Self {
         let mut ends = [1.0f64, 0.0f64];
         for piece in chunk.chunk_by(|p, q| p.facet_b == q.facet_b) {
@@ -84,7 +87,8 @@ fn opposite(edge: usize) -> usize {
 pub(super) enum PressureBasis {
     /// The dual basis mu = C phi of the covered part, with one function for each node and the shape functions phi.
     Dual(DMatrix<f64>),
-    /// The same on an edge with the shape functions of the covered part. The function of a node on the axis of revolution is zero.
+    /// The same on an edge with the shape functions of the covered part. The function of a node on the axis of
+    /// revolution is zero.
     Part(DMatrix<f64>, Part),
     /// Hat functions: the barycentric coordinate mu_i = l_i at vertex i, zero at mid-edges.
     Hats,
@@ -95,25 +99,29 @@ pub(super) enum PressureBasis {
 /// Largest ratio int |mu| / int mu of a steady mean.
 ///
 /// On a partially covered facet a function may exceed this limit. Such a facet takes hat functions, whose ratio is one.
-/// Chords of side b, whose facets are at least as long, miss a surface of curvature k by k h^2/8, where h is the length of a
-/// facet. A mean may amplify this error up to the k h^2/2 by which the surface bends along a facet, which is four times as
-/// much. Fully covered facets have ratios of 5/3 to 2.4, and up to four beside an axis. One more allows for curved facets and
-/// for sums of |mu| over few points. The ratios of whole edges are 1.6 times the root of their order: 4.6 at order 8.
+/// Chords of side b, whose facets are at least as long, miss a surface of curvature k by k h^2/8, where h is the length
+/// of a facet. A mean may amplify this error up to the k h^2/2 by which the surface bends along a facet, which is four
+/// times as much. Fully covered facets have ratios of 5/3 to 2.4, and up to four beside an axis. One more allows for
+/// curved facets and for sums of |mu| over few points. The ratios of whole edges are 1.6 times the root of their order:
+/// 4.6 at order 8.
 const STEADY: f64 = 5.0;
 
-/// Share of the area of a facet below which the integral of a function is zero. Places of pieces have errors of 1e-9 of a facet
-/// ([`side::ROUNDING`](super::side::ROUNDING)), which a mean over a smaller integral would make more than 1e-3 of a gap.
+/// Share of the area of a facet below which the integral of a function is zero. Places of pieces have errors of 1e-9 of
+/// a facet ([`side::ROUNDING`](super::side::ROUNDING)), which a mean over a smaller integral would make more than 1e-3
+/// of a gap.
 const ROUNDING: f64 = 1e-6;
 
 impl PressureBasis {
-    /// Choose the basis on facet `chunk[0].facet_a`, a simplex of `order` with `count` nodes. `chunk` holds the integration
-    /// points of the part that the facets `b` of side b cover, and `axis` is the local node on the axis of revolution.
+    /// Choose the basis on facet `chunk[0].facet_a`, a simplex of `order` with `count` nodes. `chunk` holds the
+    /// integration points of the part that the facets `b` of side b cover, and `axis` is the local node on the axis of
+    /// revolution.
     ///
-    /// On an edge of order two or more this node carries no point. On a straight edge int r phi is zero there, and on a curved edge it has either sign: it
-    /// is distributed over the other nodes, so that their weights integrate polynomials of one degree less than the elements as before.
+    /// On an edge of order two or more this node carries no point. On a straight edge int r phi is zero there, and on a
+    /// curved edge it has either sign: it is distributed over the other nodes, so that their weights integrate
+    /// polynomials of one degree less than the elements as before.
     ///
-    /// Where these facets are apart, the distance jumps, and a dual mean would be beyond the distances on both sides of the jump: an overlap
-    /// where there is none.
+    /// Where these facets are apart, the distance jumps, and a dual mean would be beyond the distances on both sides of
+    /// the jump: an overlap where there is none.
     pub fn on<const D: usize>(
         order: Order,
         count: usize,
@@ -162,7 +170,8 @@ impl PressureBasis {
         basis.or_hats(order, &carriers, chunk)
     }
 
-    /// Return this basis if the functions of these nodes have steady means on the covered part, otherwise the hat functions.
+    /// Return this basis if the functions of these nodes have steady means on the covered part, otherwise the hat
+    /// functions.
     fn or_hats<const D: usize>(self, order: Order, nodes: &[usize], chunk: &[IntegrationPoint<D>]) -> Self {
         let [mut integral, mut size] = [(); 2].map(|()| vec![0.0; element::node_count(D, order)]);
         for point in chunk {
@@ -179,7 +188,8 @@ impl PressureBasis {
         if nodes.iter().all(steady) { self } else { Self::Hats }
     }
 
-    /// Return mu of local node `i` at barycentric point `l`, where `phi` are the values of the shape functions of [`PressureBasis::shapes`].
+    /// Return mu of local node `i` at barycentric point `l`, where `phi` are the values of the shape functions of
+    /// [`PressureBasis::shapes`].
     pub fn value<const D: usize>(&self, i: usize, phi: &[f64], l: &[f64; D]) -> f64 {
         match self {
             Self::Dual(c) | Self::Part(c, _) => c.row(i).iter().zip(phi).map(|(c, phi)| c * phi).sum(),
@@ -222,9 +232,9 @@ fn are_apart<const D: usize>(b: &Facets<D>, chunk: &[IntegrationPoint<D>]) -> bo
     joined.classes().0 > 1
 }
 
-/// Return the function diag(int phi) M^-1 phi of a flat quadratic triangle for mid-edge `edge`, from the values `phi` of the
-/// shape functions with mass matrix M. The functions of the vertices vanish, since int phi is zero there. Those of the three
-/// mid-edges therefore sum to one.
+/// Return the function diag(int phi) M^-1 phi of a flat quadratic triangle for mid-edge `edge`, from the values `phi`
+/// of the shape functions with mass matrix M. The functions of the vertices vanish, since int phi is zero there. Those
+/// of the three mid-edges therefore sum to one.
 fn at_mid_edge(edge: usize, phi: &[f64]) -> f64 {
     let vertices = -0.5 * (phi[0] + phi[1] + phi[2]) + 2.5 * phi[opposite(edge)];
     let edges = -1.125 * (phi[3] + phi[4] + phi[5]) + 4.375 * phi[3 + edge];

@@ -1,7 +1,7 @@
 //! The integration points of a pair one by one, for an estimate of the error.
 //!
-//! At these points the compression of the layer and the gap are those of the points themselves, not means around the nodes. Contact
-//! points are also projected to side b, and facets at rims of the contact are marked.
+//! At these points the compression of the layer and the gap are those of the points themselves, not means around the
+//! nodes. Contact points are also projected to side b, and facets at rims of the contact are marked.
 
 use super::basis::{Carriers, PressureBasis};
 use super::pair::{ContactPair, Coverage};
@@ -21,8 +21,8 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 pub struct FinePoint {
     /// Length (area) of the point.
     pub weight: f64,
-    /// Distance of the surfaces along the normal plus the gap that the scene adds. Between surfaces that do not touch as wholes, it is
-    /// less by the heights of both curved surfaces above their straight facets (`rise`).
+    /// Distance of the surfaces along the normal plus the gap that the scene adds. Between surfaces that do not touch
+    /// as wholes, it is less by the heights of both curved surfaces above their straight facets (`rise`).
     pub gap: f64,
     /// Facet of side a under the point. Points on one facet follow each other.
     pub facet: usize,
@@ -35,7 +35,8 @@ pub struct FinePoint {
     /// Whether the contact points of this facet are at mid-edges.
     pub at_edges: bool,
     /// Degree of the pressure on this facet as a polynomial. It is that of the elements in the plane where facets are
-    /// fully covered or of order three or more; on a part of another facet, and in space, its values do not show more than a mean, which counts as one.
+    /// fully covered or of order three or more; on a part of another facet, and in space, its values do not show more
+    /// than a mean, which counts as one.
     pub degree: usize,
     /// Contact point nearest to the point, for laws that differ from point to point.
     pub nearest: usize,
@@ -50,8 +51,8 @@ pub struct FinePoints {
     pub each: Vec<FinePoint>,
     /// Matrix from values at the contact points to values at the integration points, by the shape functions of side a.
     pub interpolation: Csr,
-    /// Matrix from the pressures of the contact points to the pressures that the discrete problem has at the integration
-    /// points, by the functions mu_q of the contact points.
+    /// Matrix from the pressures of the contact points to the pressures that the discrete problem has at the
+    /// integration points, by the functions mu_q of the contact points.
     pub pressing: Csr,
     /// Places of the scene where the gap that the scene adds has a kink, on facets in the plane of order three or more.
     pub kinks: Vec<[f64; 3]>,
@@ -84,11 +85,12 @@ pub struct FineSide<const D: usize> {
 }
 
 impl<const D: usize> Fine<D> {
-    /// Collect the integration points of `pair`, which was made of these sides and common pieces. `jumps` has the nodes of both sides where the
-    /// material of their body jumps, or the law of the layer.
+    /// Collect the integration points of `pair`, which was made of these sides and common pieces. `jumps` has the nodes
+    /// of both sides where the material of their body jumps, or the law of the layer.
     ///
-    /// `gap(x)` is the gap that the scene adds to the distance of the meshes. If the surfaces are `touching`, the difference
-    /// between that distance at a contact point and its mean around it counts as zero, as does the height of surfaces above their facets.
+    /// `gap(x)` is the gap that the scene adds to the distance of the meshes. If the surfaces are `touching`, the
+    /// difference between that distance at a contact point and its mean around it counts as zero, as does the height of
+    /// surfaces above their facets.
     pub fn new(
         a: &Side<D>,
         b: &Side<D>,
@@ -107,9 +109,8 @@ impl<const D: usize> Fine<D> {
             at: shared.iter().map(at).collect(),
         };
         let rounding = a.rounding_along_normals();
-        let rise_of_both = |point: &IntegrationPoint<D>| match touching {
-            true => 0.0,
-            false => rise(a, point.facet_a, &point.at_a) + rise(b, point.facet_b, &point.at_b),
+        let rise_of_both = |point: &IntegrationPoint<D>| {
+            if touching { 0.0 } else { rise(a, point.facet_a, &point.at_a) + rise(b, point.facet_b, &point.at_b) }
         };
         let at_rim = facets_at_rim(a, b, common, &pair.cover, jumps);
         let normal_a = |point: &IntegrationPoint<D>| vector_at(a, point.facet_a, &point.at_a, |at| at.normal);
@@ -195,7 +196,8 @@ impl FinePoints {
     }
 }
 
-/// Return the gap at an integration point. A distance below `rounding`, or below that of the facet's size, counts as zero.
+/// Return the gap at an integration point. A distance below `rounding`, or below that of the facet's size, counts as
+/// zero.
 fn gap_at<const D: usize>(
     a: &Side<D>,
     point: &IntegrationPoint<D>,
@@ -226,10 +228,12 @@ fn kinks<const D: usize>(a: &Side<D>, cover: &[Coverage], gap: &dyn Fn([f64; 3])
 /// Halvings of an edge that find a kink to a millionth of it, and the least number of them that show that there is one.
 const HALVINGS: [usize; 2] = [20, 8];
 
-/// Return where a function on \[0, 1\] has a kink, if it has one: the limit of the halves in which polynomials of the order of the elements miss it most.
+/// Return where a function on \[0, 1\] has a kink, if it has one: the limit of the halves in which polynomials of the
+/// order of the elements miss it most.
 ///
-/// What polynomials of degree k miss of a smooth function falls by 2^-(k + 1) in each halving, and of |x|^s by 2^-s. The mean of both powers, with s = 1,
-/// tells them apart. The first interval is a little larger, so that neither an end nor the middle of an edge is an end of a half.
+/// What polynomials of degree k miss of a smooth function falls by 2^-(k + 1) in each halving, and of |x|^s by 2^-s.
+/// The mean of both powers, with s = 1, tells them apart. The first interval is a little larger, so that neither an end
+/// nor the middle of an edge is an end of a half.
 fn kink(order: Order, function: &dyn Fn(f64) -> f64) -> Option<f64> {
     let (shapes, tests) = (lagrange::of(order, 2), lagrange::gauss(order.degree() + 1));
     let missed = |from: f64, size: f64| -> f64 {
@@ -265,7 +269,8 @@ fn size_under<const D: usize>(a: &Side<D>, point: &IntegrationPoint<D>) -> f64 {
     (sides * length(a.area(point.facet_a))).powf(1.0 / sides)
 }
 
-/// Return a unit vector of the nodes of a side at barycentric coordinates `l` of a facet, interpolated between the vertices of the facet.
+/// Return a unit vector of the nodes of a side at barycentric coordinates `l` of a facet, interpolated between the
+/// vertices of the facet.
 fn vector_at<const D: usize>(side: &Side<D>, facet: usize, l: &[f64; D], of: fn(&FaceNode<D>) -> [f64; D]) -> [f64; D] {
     let mut sum = [0.0; D];
     for (at, l) in side.facet_nodes(facet).zip(l) {
@@ -280,8 +285,8 @@ fn vector_at<const D: usize>(side: &Side<D>, facet: usize, l: &[f64; D], of: fn(
 pub struct Projections<const D: usize> {
     /// Nearest facet of side b.
     pub facet: Vec<usize>,
-    /// Barycentric coordinates of the projection along the normal. It lies outside of the facet by a part of the facet's size
-    /// where side b ends before.
+    /// Barycentric coordinates of the projection along the normal. It lies outside of the facet by a part of the
+    /// facet's size where side b ends before.
     pub at: Vec<[f64; D]>,
     /// Unit normal from side a to side b.
     pub normal: Vec<[f64; D]>,
@@ -290,8 +295,8 @@ pub struct Projections<const D: usize> {
 }
 
 impl<const D: usize> Projections<D> {
-    /// Project the points of `pair`, which was made of these sides and common pieces. `gap(x)` is the gap that the scene adds
-    /// to the distance of the meshes; with `None` all differences of distances are zero.
+    /// Project the points of `pair`, which was made of these sides and common pieces. `gap(x)` is the gap that the
+    /// scene adds to the distance of the meshes; with `None` all differences of distances are zero.
     pub fn new(
         a: &Side<D>,
         b: &Side<D>,
@@ -359,9 +364,10 @@ fn distance<const D: usize>(b: &Side<D>, facet: usize, at: &[f64; D], from: [f64
 
 /// Return the height of the surface of a side above a facet at barycentric coordinates.
 ///
-/// A curved facet is the surface itself. So is a straight one of order two or more, unless it is a chord ([`rises`]). Over a linear facet the surface is taken to rise by
-/// l_i l_j (n_j - n_i).(x_j - x_i)/2 for each edge ij, since a curve between two normals is a parabola. Here l_i is the
-/// barycentric coordinate, n_i the normal and x_i the place of corner i.
+/// A curved facet is the surface itself. So is a straight one of order two or more, unless it is a chord ([`rises`]).
+/// Over a linear facet the surface is taken to rise by l_i l_j (n_j - n_i).(x_j - x_i)/2 for each edge ij, since a
+/// curve between two normals is a parabola. Here l_i is the barycentric coordinate, n_i the normal and x_i the place of
+/// corner i.
 fn rise<const D: usize>(side: &Side<D>, facet: usize, at: &[f64; D]) -> f64 {
     if side.facets.order != Order::P1 {
         return rises(side, facet).iter().zip(products(at)).map(|(rise, l)| rise * l).sum();
@@ -377,16 +383,17 @@ fn rise<const D: usize>(side: &Side<D>, facet: usize, at: &[f64; D]) -> f64 {
     rise
 }
 
-/// Return, for each facet of side a, whether it lies at a rim, where the pressure may be singular, since one of the surfaces ends there.
-/// `cover` is the coverage of these facets.
+/// Return, for each facet of side a, whether it lies at a rim, where the pressure may be singular, since one of the
+/// surfaces ends there. `cover` is the coverage of these facets.
 ///
-/// Near the edge of a contact surface the pressure of bodies without a layer is K r^(lambda - 1) at the distance r from the edge, with
-/// 1/2 <= lambda. The edge is no rim where the surface goes on as its mirror image: on an axis of revolution, and on a plane of symmetry.
-/// A facet lies at a rim if such an edge of side a bounds it. It does, too, if side b ends on it, where side a ends with a mirror image, or on a
-/// facet beside it, at such an edge of b: the covered part of that facet may be a sliver.
+/// Near the edge of a contact surface the pressure of bodies without a layer is K r^(lambda - 1) at the distance r from
+/// the edge, with 1/2 <= lambda. The edge is no rim where the surface goes on as its mirror image: on an axis of
+/// revolution, and on a plane of symmetry. A facet lies at a rim if such an edge of side a bounds it. It does, too, if
+/// side b ends on it, where side a ends with a mirror image, or on a facet beside it, at such an edge of b: the covered
+/// part of that facet may be a sliver.
 ///
-/// The pressure may be singular where an interface of two materials ends in the contact, too, on the softer one as at a corner of the stiffer one.
-/// It jumps with the law of a layer, and no polynomial on a facet follows that.
+/// The pressure may be singular where an interface of two materials ends in the contact, too, on the softer one as at a
+/// corner of the stiffer one. It jumps with the law of a layer, and no polynomial on a facet follows that.
 fn facets_at_rim<const D: usize>(
     a: &Side<D>,
     b: &Side<D>,
@@ -416,7 +423,8 @@ fn is_at_rim<const D: usize>(side: &Side<D>, facets: &HashMap<[u32; D], Vec<usiz
     side.facets.edges(i).into_iter().any(|edge| facets[&edge].len() == 1 && !is_mirrored(side, i, edge))
 }
 
-/// Return whether the surface goes on beyond an edge of facet `i` as its mirror image, on an axis of revolution or a plane of symmetry.
+/// Return whether the surface goes on beyond an edge of facet `i` as its mirror image, on an axis of revolution or a
+/// plane of symmetry.
 fn is_mirrored<const D: usize>(side: &Side<D>, i: usize, edge: [u32; D]) -> bool {
     let nodes: Vec<(u32, [f64; D])> =
         side.facet_nodes(i).filter(|at| edge[..D - 1].contains(&at.node)).map(|at| (at.node, at.normal)).collect();

@@ -1,14 +1,15 @@
 //! Planes of symmetry at the end of a contact surface, where the surface goes on as its mirror image.
 //!
-//! A plane of symmetry is a plane face of the body whose displacement along its own normal is held at zero, and which meets the contact surface
-//! in an edge. The axis of a body of revolution is one, too.
+//! A plane of symmetry is a plane face of the body whose displacement along its own normal is held at zero, and which
+//! meets the contact surface in an edge. The axis of a body of revolution is one, too.
 
 use crate::fem::{Facets, Frame, Space};
 use crate::linalg::dot;
 use std::collections::{HashMap, HashSet};
 
-/// Square of the part of a unit vector that supports leave free up to which they hold it. Axes of supports are those of the scene or of
-/// facets, known to 1e-9 or better; a support that is inclined to a plane by more than 1e-3 is none of a plane of symmetry.
+/// Square of the part of a unit vector that supports leave free up to which they hold it. Axes of supports are those of
+/// the scene or of facets, known to 1e-9 or better; a support that is inclined to a plane by more than 1e-3 is none of
+/// a plane of symmetry.
 const HELD: f64 = 1e-6;
 
 /// The planes of symmetry that meet a surface at its ends.
@@ -46,9 +47,9 @@ impl<const D: usize> Mirrors<D> {
         Self { planes }
     }
 
-    /// Return the sum of the normals of facets around a node and of their mirror images, from the sum of the facets alone. A plane at which
-    /// the surface turns by an angle whose cosine is less than `least` is an edge, and does not count. A surface of revolution is always
-    /// continued beyond its axis.
+    /// Return the sum of the normals of facets around a node and of their mirror images, from the sum of the facets
+    /// alone. A plane at which the surface turns by an angle whose cosine is less than `least` is an edge, and does not
+    /// count. A surface of revolution is always continued beyond its axis.
     pub fn mean(&self, space: &Space<D>, node: u32, sum: [f64; D], least: f64) -> [f64; D] {
         let mut mean = sum;
         if space.on_axis(node) && mean[1] != 0.0 {
@@ -63,7 +64,8 @@ impl<const D: usize> Mirrors<D> {
         mean
     }
 
-    /// Return the unit normal of the plane beyond which a surface goes on smoothly as its mirror image from a node, where it has this unit normal.
+    /// Return the unit normal of the plane beyond which a surface goes on smoothly as its mirror image from a node,
+    /// where it has this unit normal.
     pub fn plane_at(&self, space: &Space<D>, node: u32, normal: [f64; D]) -> Option<[f64; D]> {
         let axis = std::array::from_fn(|c| f64::from(u8::from(c == 0)));
         let of_axis = space.on_axis(node).then_some(axis);
@@ -83,7 +85,8 @@ impl<const D: usize> Mirrors<D> {
     }
 }
 
-/// Return the nodes and normals of the facets of a body that meet the end of a surface, where supports hold some of its nodes.
+/// Return the nodes and normals of the facets of a body that meet the end of a surface, where supports hold some of its
+/// nodes.
 fn beside<const D: usize>(
     space: &Space<D>,
     facets: &Facets<D>,

@@ -1,15 +1,18 @@
 //! One normal at each point of a pair, made of the normals of both sides at places that face each other.
 //!
-//! Let n_a and -n_b be unit vectors from side a to side b, and let kappa_a and kappa_b be the curvatures of the surfaces. The direction is
+//! Let n_a and -n_b be unit vectors from side a to side b, and let kappa_a and kappa_b be the curvatures of the
+//! surfaces. The direction is
 //!
 //! ```text
 //! n = unit(kappa_b n_a - kappa_a n_b)
 //! ```
 //!
-//! so that the less curved surface counts; two flats, and surfaces of equal curvature, give the plain mean (docs/theory.md, "The normals").
+//! so that the less curved surface counts; two flats, and surfaces of equal curvature, give the plain mean
+//! (docs/theory.md, "The normals").
 //!
-//! The spread of n is that of both sides with the same weights: the mean of (n_f - n_a)(n_f - n_a)' over the unit normals n_f of the facets around n_a, and
-//! the like for n_b. Surfaces that turn away from each other add nothing to it.
+//! The spread of n is that of both sides with the same weights: the mean of (n_f - n_a)(n_f - n_a)' over the unit
+//! normals n_f of the facets around n_a, and the like for n_b. Surfaces that turn away from each other add nothing to
+//! it.
 
 use super::basis::PressureBasis;
 use super::pieces::Intersection;
@@ -22,7 +25,8 @@ use crate::problem::order::Order;
 #[derive(Clone, Copy)]
 struct Facing<const D: usize> {
     weight: f64,
-    /// Area of the facets around the node, over which the curvature is the plain mean: one that extrapolates could be negative.
+    /// Area of the facets around the node, over which the curvature is the plain mean: one that extrapolates could be
+    /// negative.
     area: f64,
     normal: [f64; D],
     curvature: f64,
@@ -30,8 +34,8 @@ struct Facing<const D: usize> {
 }
 
 impl<const D: usize> Side<'_, D> {
-    /// Replace the directions of this side by those made of both normals, where `common` are its common pieces with side b. Return whether
-    /// some have changed.
+    /// Replace the directions of this side by those made of both normals, where `common` are its common pieces with
+    /// side b. Return whether some have changed.
     pub fn towards(&mut self, b: &Side<D>, common: &Intersection<D>) -> bool {
         let mut changed = false;
         for (at, facing) in facing(self, b, common).into_iter().enumerate() {
@@ -65,7 +69,8 @@ fn facing<const D: usize>(a: &Side<D>, b: &Side<D>, common: &Intersection<D>) ->
     let mut sums = vec![none; a.nodes.len()];
     for chunk in common.points.chunk_by(|p, q| p.facet_a == q.facet_a) {
         let on = a.on_facet(chunk[0].facet_a);
-        // The vertices, between which directions are interpolated, need not carry points up to order two; all other nodes do so by their own functions.
+        // The vertices, between which directions are interpolated, need not carry points up to order two; all other
+        // nodes do so by their own functions.
         let linear = if a.facets.order <= Order::P2 { D } else { 0 };
         let [vertices, all] = [(Order::P1, D), (a.facets.order, on.len())]
             .map(|(order, count)| PressureBasis::on(order, count, chunk, &b.facets, a.axis_of(chunk[0].facet_a)));
@@ -101,7 +106,8 @@ fn facing<const D: usize>(a: &Side<D>, b: &Side<D>, common: &Intersection<D>) ->
     means
 }
 
-/// Give nodes that nothing faces the surface before the nearest nodes, facet by facet, so that directions do not jump where side b ends.
+/// Give nodes that nothing faces the surface before the nearest nodes, facet by facet, so that directions do not jump
+/// where side b ends.
 fn spread<const D: usize>(a: &Side<D>, facing: &mut [Option<Facing<D>>]) {
     loop {
         let mut found: Vec<(u32, Facing<D>)> = Vec::new();
@@ -116,7 +122,8 @@ fn spread<const D: usize>(a: &Side<D>, facing: &mut [Option<Facing<D>>]) {
     }
 }
 
-/// Return what side b is at barycentric coordinates of a facet. Curvatures and spreads are means over nodes, which are not negative.
+/// Return what side b is at barycentric coordinates of a facet. Curvatures and spreads are means over nodes, which are
+/// not negative.
 fn surface_at<const D: usize>(side: &Side<D>, facet: usize, at: &[f64; D]) -> Facing<D> {
     let mut found = Facing { weight: 1.0, area: 1.0, normal: [0.0; D], curvature: 0.0, spread: [[0.0; D]; D] };
     let phi = element::values(side.facets.order, at);

@@ -1,4 +1,5 @@
-//! The arrays of a contact pair, which are all that the solution methods know of two surfaces, and how much of them is paired.
+//! The arrays of a contact pair, which are all that the solution methods know of two surfaces, and how much of them is
+//! paired.
 
 use super::basis::{Carriers, PressureBasis};
 use super::law::{LawMaker, LayerLaw, LinearLaw};
@@ -16,10 +17,10 @@ use std::rc::Rc;
 /// A discretised pair of surfaces: n contact points with one pressure each.
 ///
 /// Contact point q stands for a function mu_q of a pressure space on side a. These functions sum to one on the covered
-/// surface, and omega_q = int mu_q is the area of the point. Let `<v>_q = (1/omega_q) int mu_q v` be the mean of v over the
-/// common pieces of both surfaces. The compression of the layer is `c = B_a u_a + B_b u_b - d`, where u_a and u_b are the
-/// displacements, B_a and B_b the rows and d the gap. One set of points serves both sides, so action equals reaction to
-/// rounding.
+/// surface, and omega_q = int mu_q is the area of the point. Let `<v>_q = (1/omega_q) int mu_q v` be the mean of v over
+/// the common pieces of both surfaces. The compression of the layer is `c = B_a u_a + B_b u_b - d`, where u_a and u_b
+/// are the displacements, B_a and B_b the rows and d the gap. One set of points serves both sides, so action equals
+/// reaction to rounding.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct ContactPair {
     /// Names of the two surfaces; the first is side a, which carries the points.
@@ -30,12 +31,13 @@ pub struct ContactPair {
     pub nodes: Vec<u32>,
     /// Index of each point among the nodes of side a on its faces ([`Side::nodes`]), n.
     pub on_side: Vec<u32>,
-    /// Smooth face of side a on which each point lies, numbered from 1, n. Faces are in the order of the middles of their points by x, then
-    /// by y and z.
+    /// Smooth face of side a on which each point lies, numbered from 1, n. Faces are in the order of the middles of
+    /// their points by x, then by y and z.
     pub face: Vec<u32>,
     /// Positions of the points on side a in the scene, n.
     pub position: Vec<[f64; 3]>,
-    /// omega_q > 0, the length in the plane, else the area (in bodies of revolution that of a ring) across the normal, n.
+    /// omega_q > 0, the length in the plane, else the area (in bodies of revolution that of a ring) across the normal,
+    /// n.
     pub area: Vec<f64>,
     /// Unit normals from side a to side b, made of those of both sides, n.
     pub normal: Vec<[f64; 3]>,
@@ -43,7 +45,8 @@ pub struct ContactPair {
     pub tilt: Vec<f64>,
     /// Whether the normals were turned across motions that nothing holds ([`ContactPair::turn`]).
     pub is_turned: bool,
-    /// Spread of the normals of the facets around each point, n; empty where no facet of the pair leans. The first rank alone has it.
+    /// Spread of the normals of the facets around each point, n; empty where no facet of the pair leans. The first rank
+    /// alone has it.
     #[serde(skip)]
     pub spread: Vec<[[f64; 3]; 3]>,
     /// Mean distance of the meshes around each point along the normal, n.
@@ -54,17 +57,17 @@ pub struct ContactPair {
     pub offset: f64,
     /// Contribution of prescribed displacements to the outer normal displacement of each side, n each.
     pub prescribed: [Vec<f64>; 2],
-    /// B_a and B_b, n rows each with the dofs of the body as columns: `B_a u_a = <n.u_a>`, `B_b u_b = -<n.u_b>`. Prescribed
-    /// dofs have no entries.
+    /// B_a and B_b, n rows each with the dofs of the body as columns: `B_a u_a = <n.u_a>`, `B_b u_b = -<n.u_b>`.
+    /// Prescribed dofs have no entries.
     pub rows: [Csr; 2],
-    /// The same rows for the displacements of all nodes, constrained ones included, with columns `D * node + component`. The
-    /// nodal forces of the contact are `-sum_q omega_q p_q nodal[side][q]`.
+    /// The same rows for the displacements of all nodes, constrained ones included, with columns `D * node +
+    /// component`. The nodal forces of the contact are `-sum_q omega_q p_q nodal[side][q]`.
     pub nodal: [Csr; 2],
     /// Sum of the entries of each row by component, prescribed dofs included. The contact force on a side is
     /// `-sum_q omega_q p_q resultant[side][q]`.
     pub resultant: [Vec<[f64; 3]>; 2],
-    /// Moment of the entries of each row about the origin of the scene. The contact moment on a side follows as the force
-    /// does from `resultant`.
+    /// Moment of the entries of each row about the origin of the scene. The contact moment on a side follows as the
+    /// force does from `resultant`.
     pub moment: [Vec<[f64; 3]>; 2],
     /// Largest angle by which errors of coordinates turn the normals of a side.
     pub uncertainty: f64,
@@ -133,12 +136,13 @@ pub enum Fault {
     Law(Error),
 }
 
-/// Integrate over common pieces. Return the integrals of each node (on a face) that carries a point, and the coverage of each facet of side a.
+/// Integrate over common pieces. Return the integrals of each node (on a face) that carries a point, and the coverage
+/// of each facet of side a.
 ///
-/// Contact points are the nodes of side a with the dual basis diag(int phi) M^-1 phi of the covered part of each facet, where
-/// phi are the shape functions and M is their mass matrix. On quadratic triangles they are the mid-edges with the dual basis
-/// of the whole triangle. A partially covered facet on which this basis has unsteady means takes the hat functions of its
-/// vertices instead.
+/// Contact points are the nodes of side a with the dual basis diag(int phi) M^-1 phi of the covered part of each facet,
+/// where phi are the shape functions and M is their mass matrix. On quadratic triangles they are the mid-edges with the
+/// dual basis of the whole triangle. A partially covered facet on which this basis has unsteady means takes the hat
+/// functions of its vertices instead.
 fn integrate<const D: usize>(
     a: &Side<D>,
     b: &Side<D>,
@@ -174,8 +178,8 @@ fn integrate<const D: usize>(
 
 /// Assemble the arrays of a pair from the common pieces of its surfaces.
 ///
-/// `bodies` are the indices of the bodies of side a and b. `gap(x)` is added to the distance of the meshes. `law` makes the
-/// layer's law for the contact points.
+/// `bodies` are the indices of the bodies of side a and b. `gap(x)` is added to the distance of the meshes. `law` makes
+/// the layer's law for the contact points.
 ///
 /// # Errors
 /// [`Fault`] if nothing is covered, the gap is not finite, or the law is invalid.
@@ -246,7 +250,8 @@ fn spreads<const D: usize>(nodes: &[&FaceNode<D>], rounding: f64) -> Vec<[[f64; 
 
 /// Return the number of the face of each contact point.
 ///
-/// Middles that differ by less than a thousandth of the surface count as equal, so that numbers do not depend on the mesh.
+/// Middles that differ by less than a thousandth of the surface count as equal, so that numbers do not depend on the
+/// mesh.
 fn faces<const D: usize>(a: &Side<D>, on_side: &[u32], points: &[&Accumulator], position: &[[f64; 3]]) -> Vec<u32> {
     let (face, [low, high]) = (a.faces(), a.extent());
     let step = 1e-3 * (0..D).map(|c| high[c] - low[c]).fold(0.0, f64::max);
@@ -328,7 +333,8 @@ struct Accumulator {
 impl Accumulator {
     /// Return the shares of the nodes of a side in the contact point, which sum to one.
     ///
-    /// The largest share takes those that are noise, so that surfaces that match to nine digits have nodal rows on both sides.
+    /// The largest share takes those that are noise, so that surfaces that match to nine digits have nodal rows on both
+    /// sides.
     fn shares(&self, side: usize) -> Vec<(u32, f64)> {
         let shares = self.sides[side].iter().map(|(&node, value)| (node, value / self.weight));
         let (mut kept, noise): (Vec<_>, Vec<_>) = shares.partition(|(_, share)| share.abs() > NOISE);

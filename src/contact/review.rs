@@ -1,5 +1,5 @@
-//! What a user should know of a pair: how far straight facets leave curved surfaces, and where the pair ends because its surfaces are
-//! farther apart than its largest distance.
+//! What a user should know of a pair: how far straight facets leave curved surfaces, and where the pair ends because
+//! its surfaces are farther apart than its largest distance.
 
 use super::pair::ContactPair;
 use super::pieces::Intersection;
@@ -17,14 +17,16 @@ pub struct Chords {
     pub sagitta: f64,
     /// Mean height of both surfaces above their facets around each contact point, by which the gap is too large, n.
     pub height: Vec<f64>,
-    /// Length of a wave of pressures that the corners between facets make: that of a facet. It is zero for linear elements, which do not show such waves.
+    /// Length of a wave of pressures that the corners between facets make: that of a facet. It is zero for linear
+    /// elements, which do not show such waves.
     pub wave: f64,
 }
 
 impl Chords {
     /// Return the heights at a pair, `None` if no facet is a chord of a curved surface.
     ///
-    /// Where facets of both sides match, one surface lies above its facets by as much as the other lies below, and the heights cancel.
+    /// Where facets of both sides match, one surface lies above its facets by as much as the other lies below, and the
+    /// heights cancel.
     pub fn of<const D: usize>(a: &Side<D>, b: &Side<D>, common: &Intersection<D>, pair: &ContactPair) -> Option<Self> {
         let (mut sums, mut sagitta) = (HashMap::<u32, [f64; 2]>::new(), 0.0f64);
         let rises: [Vec<Vec<f64>>; 2] = [a, b].map(|side| (0..side.facets.count()).map(|i| rises(side, i)).collect());
@@ -44,11 +46,11 @@ impl Chords {
     }
 }
 
-/// Return the rise of a curved surface over each edge of a facet, in the order of [`products`]: the factor of l_i l_j in the height of the
-/// surface above the facet. It is zero on a facet that is curved itself.
+/// Return the rise of a curved surface over each edge of a facet, in the order of [`products`]: the factor of l_i l_j
+/// in the height of the surface above the facet. It is zero on a facet that is curved itself.
 ///
-/// The edge from x_i to x_j is a chord if the normals at both ends turn away from the facet to opposite sides. Beside an edge of a part only one
-/// of them does. The smaller turn counts.
+/// The edge from x_i to x_j is a chord if the normals at both ends turn away from the facet to opposite sides. Beside
+/// an edge of a part only one of them does. The smaller turn counts.
 pub(super) fn rises<const D: usize>(side: &Side<D>, facet: usize) -> Vec<f64> {
     let x = side.facets.coordinates(facet, side.space);
     let is_straight = element::is_straight(side.facets.order, &x, D);
@@ -70,8 +72,8 @@ fn edges<const D: usize>() -> impl Iterator<Item = (usize, usize)> {
     element::EDGES[..D * (D - 1) / 2].iter().copied()
 }
 
-/// Return the contact points beside which the pair ends because what lies before side a is too far away. `far` are the nodes of facets of side a
-/// that were found to be too far away before the pair was made.
+/// Return the contact points beside which the pair ends because what lies before side a is too far away. `far` are the
+/// nodes of facets of side a that were found to be too far away before the pair was made.
 pub fn ends<const D: usize>(
     a: &Side<D>,
     common: &Intersection<D>,

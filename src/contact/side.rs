@@ -1,4 +1,5 @@
-//! One contact surface of a body: its facets, its nodes with their normals and curvatures, its smooth faces, and the order of nodes along it.
+//! One contact surface of a body: its facets, its nodes with their normals and curvatures, its smooth faces, and the
+//! order of nodes along it.
 
 use super::law::LawMaker;
 use super::mirror::Mirrors;
@@ -44,7 +45,8 @@ pub struct FaceNode<const D: usize> {
     pub tilt: f64,
     /// Curvature (1/length): the largest difference of two nodal normals over their distance, on the facets around.
     pub curvature: f64,
-    /// Mean of (n_f - n)(n_f - n)' over the unit normals n_f of the facets around, where n is `normal`; of both sides, where `direction` is.
+    /// Mean of (n_f - n)(n_f - n)' over the unit normals n_f of the facets around, where n is `normal`; of both sides,
+    /// where `direction` is.
     pub spread: Spread<D>,
 }
 
@@ -57,7 +59,8 @@ fn add_square<const D: usize>(spread: &mut Spread<D>, weight: f64, v: [f64; D]) 
 }
 
 impl<'a, const D: usize> Side<'a, D> {
-    /// Compute the nodal normals and curvatures of a surface. Facets around a node that turn by no more than `edge` degrees are of one face.
+    /// Compute the nodal normals and curvatures of a surface. Facets around a node that turn by no more than `edge`
+    /// degrees are of one face.
     pub fn new(
         name: &'a str,
         space: &'a Space<D>,
@@ -92,7 +95,8 @@ impl<'a, const D: usize> Side<'a, D> {
         side
     }
 
-    /// Give the nodes within curved facets, which have one normal, the mean spread at the vertices: the kinks there show how far normals between them err.
+    /// Give the nodes within curved facets, which have one normal, the mean spread at the vertices: the kinks there
+    /// show how far normals between them err.
     fn spread_within(&mut self) {
         let (stride, mut facets_at) = (self.facets.stride, vec![0; self.nodes.len()]);
         self.corners.iter().for_each(|&at| facets_at[at as usize] += 1);
@@ -110,8 +114,8 @@ impl<'a, const D: usize> Side<'a, D> {
         }
     }
 
-    /// Give the nodes of each flat face one normal, where coordinates have fewer digits than doubles. A face is flat if its normals
-    /// differ from their mean by no more than errors of coordinates allow for.
+    /// Give the nodes of each flat face one normal, where coordinates have fewer digits than doubles. A face is flat if
+    /// its normals differ from their mean by no more than errors of coordinates allow for.
     fn flatten(&mut self) {
         if self.space.uncertainty == 0.0 {
             return;
@@ -149,8 +153,8 @@ impl<'a, const D: usize> Side<'a, D> {
         }
     }
 
-    /// Return by how much the normal of facet `i` turns, and over which lengths: between its nodes, or on an edge of an order above two by the height
-    /// above its chord, which has more digits than the tangents.
+    /// Return by how much the normal of facet `i` turns, and over which lengths: between its nodes, or on an edge of an
+    /// order above two by the height above its chord, which has more digits than the tangents.
     fn turns(&self, i: usize) -> Vec<(f64, f64)> {
         let (x, on) = (self.facets.coordinates(i, self.space), self.on_facet(i));
         if self.facets.order > Order::P2 {
@@ -243,8 +247,8 @@ impl<'a, const D: usize> Side<'a, D> {
         self.facets.tilt(self.space, self.rounding())
     }
 
-    /// Return the rounding error of a distance between this side and its partner: that of the coordinates of both sides, along
-    /// any normal.
+    /// Return the rounding error of a distance between this side and its partner: that of the coordinates of both
+    /// sides, along any normal.
     pub fn rounding_along_normals(&self) -> f64 {
         2.0 * (D as f64).sqrt() * self.rounding()
     }
@@ -260,7 +264,8 @@ impl<'a, const D: usize> Side<'a, D> {
     }
 }
 
-/// Return the facets around each node: the index of the node in `facets.nodes`, and the outer normal there times the size of the facet.
+/// Return the facets around each node: the index of the node in `facets.nodes`, and the outer normal there times the
+/// size of the facet.
 fn areas_around<const D: usize>(space: &Space<D>, facets: &Facets<D>) -> BTreeMap<u32, Vec<(usize, [f64; D])>> {
     let mut around: BTreeMap<u32, Vec<(usize, [f64; D])>> = BTreeMap::new();
     let places = element::nodes::<D>(facets.order);
@@ -273,7 +278,8 @@ fn areas_around<const D: usize>(space: &Space<D>, facets: &Facets<D>) -> BTreeMa
     around
 }
 
-/// Divide the facets around a node into faces, within which neighbours turn by an angle with the cosine `least` or more.
+/// Divide the facets around a node into faces, within which neighbours turn by an angle with the cosine `least` or
+/// more.
 fn smooth<const D: usize>(around: &[(usize, [f64; D])], least: f64) -> Vec<Vec<(usize, [f64; D])>> {
     let normals: Vec<[f64; D]> = around.iter().map(|&(_, area)| unit(area)).collect();
     let mut joined = DisjointSets::new(around.len());
@@ -286,14 +292,16 @@ fn smooth<const D: usize>(around: &[(usize, [f64; D])], least: f64) -> Vec<Vec<(
     faces
 }
 
-/// Compression at which laws at two places are compared, as a share of the size of a facet. Laws that differ by a factor differ at any compression, and
-/// the layers of the theory are thin beside facets.
+/// Compression at which laws at two places are compared, as a share of the size of a facet. Laws that differ by a
+/// factor differ at any compression, and the layers of the theory are thin beside facets.
 const SLIGHT: f64 = 1e-3;
 
-/// Number of halvings of a line after which the difference of a smooth function at its ends is a thousandth of what it was.
+/// Number of halvings of a line after which the difference of a smooth function at its ends is a thousandth of what it
+/// was.
 const HALVINGS: usize = 10;
 
-/// Return whether most of the difference of a function at the ends of a line is a jump: whether it stays in one half, again and again.
+/// Return whether most of the difference of a function at the ends of a line is a jump: whether it stays in one half,
+/// again and again.
 fn has_jump(mut ends: [[f64; 3]; 2], value: impl Fn([f64; 3]) -> Result<f64>) -> Result<bool> {
     let mut values = [value(ends[0])?, value(ends[1])?];
     let whole = (values[1] - values[0]).abs();
@@ -306,12 +314,12 @@ fn has_jump(mut ends: [[f64; 3]; 2], value: impl Fn([f64; 3]) -> Result<f64>) ->
     Ok((values[1] - values[0]).abs() > 0.5 * whole)
 }
 
-/// Rounding of the cosine of the angle between two facets. A facet of a millionth of its mesh has normals to 2e-10, the rounding of
-/// coordinates over its size; so a regular polygon that turns by just the angle of an edge is smooth.
+/// Rounding of the cosine of the angle between two facets. A facet of a millionth of its mesh has normals to 2e-10, the
+/// rounding of coordinates over its size; so a regular polygon that turns by just the angle of an edge is smooth.
 pub const ROUNDING: f64 = 1e-9;
 
-/// Sort nodes of a surface for plots, given by their indices. In the plane they follow the curve, and each chain begins at the end with
-/// the smaller coordinates. In space they are sorted by coordinates.
+/// Sort nodes of a surface for plots, given by their indices. In the plane they follow the curve, and each chain begins
+/// at the end with the smaller coordinates. In space they are sorted by coordinates.
 pub fn along<const D: usize>(side: &Side<D>, nodes: impl Iterator<Item = u32>) -> Vec<u32> {
     let mut nodes: Vec<u32> = nodes.collect();
     let at = |i: u32| side.space.nodes[side.nodes[i as usize].node as usize];

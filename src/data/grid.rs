@@ -1,5 +1,5 @@
-//! Values at the points of a regular grid in one direction or two, and their interpolation. A lookup takes the same few operations
-//! whatever the size.
+//! Values at the points of a regular grid in one direction or two, and their interpolation. A lookup takes the same few
+//! operations whatever the size.
 
 use super::read::NumberRows;
 use super::rule::{DataSpec, Detrend, Interpolation, Outside, Sample};
@@ -17,8 +17,8 @@ pub struct GridAxis {
 }
 
 impl GridAxis {
-    /// Return the first and the last place with a value. They are half a spacing beyond the points, since a measured height is the mean over a
-    /// cell around its point.
+    /// Return the first and the last place with a value. They are half a spacing beyond the points, since a measured
+    /// height is the mean over a cell around its point.
     pub fn range(&self) -> [f64; 2] {
         [-0.5, self.count as f64 - 0.5].map(|steps| self.origin + self.spacing * steps)
     }
@@ -74,8 +74,8 @@ impl Grid {
         Ok(grid)
     }
 
-    /// Subtract the plane of least squares. On a grid, with coordinates from its middle, the constant and both slopes are orthogonal:
-    /// each is the mean of the heights times its function, over the mean square of the function.
+    /// Subtract the plane of least squares. On a grid, with coordinates from its middle, the constant and both slopes
+    /// are orthogonal: each is the mean of the heights times its function, over the mean square of the function.
     fn subtract_plane(&mut self) {
         let columns = self.axes[0].count;
         let middle = self.axes.map(|axis| 0.5 * (axis.count - 1) as f64);
@@ -152,7 +152,8 @@ impl Grid {
 }
 
 impl Stencil {
-    /// Replace the point beyond the end of the grid by extrapolation, f = 3 f1 - 3 f2 + f3, from the three points next to it.
+    /// Replace the point beyond the end of the grid by extrapolation, f = 3 f1 - 3 f2 + f3, from the three points next
+    /// to it.
     ///
     /// This is Keys' condition, which keeps the third order.
     fn fold(&mut self, beyond: usize, next: [usize; 3]) {

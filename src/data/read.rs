@@ -1,4 +1,5 @@
-//! Heights in rows from a file: an array of NumPy (`.npy`), or a text with numbers parted by commas, semicolons, tabs or blanks.
+//! Heights in rows from a file: an array of NumPy (`.npy`), or a text with numbers parted by commas, semicolons, tabs
+//! or blanks.
 
 use super::rule::DataSpec;
 use crate::error::{Error, Result};
@@ -37,7 +38,8 @@ pub fn rows(spec: &DataSpec) -> Result<NumberRows> {
     }
 }
 
-/// Read a text. Lines that begin with `#` are skipped, and so are lines before the first number, such as names of columns.
+/// Read a text. Lines that begin with `#` are skipped, and so are lines before the first number, such as names of
+/// columns.
 fn of_text(spec: &DataSpec, bytes: &[u8]) -> Result<NumberRows> {
     let no_text = |what: &str| spec.refuse(format!("is neither text nor a file of NumPy: it {what}"), PREPARE);
     if let Some(other) = other_encoding(bytes) {
@@ -74,8 +76,8 @@ fn fields(line: &str) -> Vec<&str> {
     }
 }
 
-/// Read an array of NumPy behind the name of its format: two bytes of the version, the length of the header, the header as a
-/// dictionary of Python, and the numbers.
+/// Read an array of NumPy behind the name of its format: two bytes of the version, the length of the header, the header
+/// as a dictionary of Python, and the numbers.
 fn of_numpy(spec: &DataSpec, bytes: &[u8]) -> Result<NumberRows> {
     let short = || spec.refuse("ends before its numbers", "it was cut short or damaged: copy it once more");
     // the length has two bytes in version 1 and four in later ones
@@ -103,9 +105,10 @@ fn of_numpy(spec: &DataSpec, bytes: &[u8]) -> Result<NumberRows> {
     if rows.checked_mul(columns) != Some(numbers.len()) {
         return Err(refuse_array(spec, format!("has {} numbers, and {rows} x {columns} by its header", numbers.len())));
     }
-    let values = match value("fortran_order").starts_with("True") {
-        true => (0..numbers.len()).map(|k| numbers[k / columns + rows * (k % columns)]).collect(),
-        false => numbers,
+    let values = if value("fortran_order").starts_with("True") {
+        (0..numbers.len()).map(|k| numbers[k / columns + rows * (k % columns)]).collect()
+    } else {
+        numbers
     };
     Ok(NumberRows { columns, values })
 }

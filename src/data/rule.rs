@@ -13,8 +13,8 @@ pub enum Interpolation {
     /// Continuous, with kinks at the points.
     #[default]
     Linear,
-    /// Cubic convolution of R. Keys (IEEE Trans. Acoust. Speech Signal Process. 29, 1981): the gradient is continuous, the error of third
-    /// order in the spacing.
+    /// Cubic convolution of R. Keys (IEEE Trans. Acoust. Speech Signal Process. 29, 1981): the gradient is continuous,
+    /// the error of third order in the spacing.
     Cubic,
 }
 

@@ -1,19 +1,19 @@
 //! How far an iterate in equilibrium is from the solution: a bound by duality.
 //!
-//! After a linear step, displacements u and pressures p are in equilibrium: K u + B' omega p = f. Let P be the energy of the law, P* its
-//! complementary energy, c = B u - d, and (u*, c*, p*) the solution. Then convex duality (Fenchel; engineers know it as the error in the
-//! constitutive relation) gives an identity,
+//! After a linear step, displacements u and pressures p are in equilibrium: K u + B' omega p = f. Let P be the energy
+//! of the law, P* its complementary energy, c = B u - d, and (u*, c*, p*) the solution. Then convex duality (Fenchel;
+//! engineers know it as the error in the constitutive relation) gives an identity,
 //!
 //! ```text
 //! gap = sum omega ( P(c) + P*(p) - c p )  =  |u - u*|_K^2 + sum omega ( D_P(c, c*) + D_P*(p, p*) ),
 //! ```
 //!
-//! with the Bregman distances D_P(c, c*) = P(c) - P(c*) - p* (c - c*) >= 0 and D_P* alike. So the root of the gap is the error of bodies,
-//! compressions and pressures together, and a bound of |u - u*|_K. Each term of the gap is zero on the graph of the law and positive
-//! elsewhere. The bound needs no spectrum, no history and no constants.
+//! with the Bregman distances D_P(c, c*) = P(c) - P(c*) - p* (c - c*) >= 0 and D_P* alike. So the root of the gap is
+//! the error of bodies, compressions and pressures together, and a bound of |u - u*|_K. Each term of the gap is zero on
+//! the graph of the law and positive elsewhere. The bound needs no spectrum, no history and no constants.
 //!
-//! Beside the bound stand what errors are measured by ([`Scale`]), and what roundoff makes of compressions and pressures where displacements are far
-//! larger than compressions.
+//! Beside the bound stand what errors are measured by ([`Scale`]), and what roundoff makes of compressions and
+//! pressures where displacements are far larger than compressions.
 
 use super::start;
 use super::step::Equilibrium;
@@ -24,8 +24,8 @@ use crate::model::layer::{Layer, in_series, surface_slopes};
 use crate::model::linear::LinearSolution;
 use crate::model::rigid::PART;
 
-/// Energy norm of the unbalanced forces, relative to bodies and layers, up to which a linear step is exact: half of the digits, the root of epsilon. An inexact factorisation
-/// leaves more, and no bound holds then.
+/// Energy norm of the unbalanced forces, relative to bodies and layers, up to which a linear step is exact: half of the
+/// digits, the root of epsilon. An inexact factorisation leaves more, and no bound holds then.
 pub(super) const EXACT: f64 = 1.5e-8;
 
 /// The relative errors that end a run of Newton's method.
@@ -33,18 +33,20 @@ pub(super) const EXACT: f64 = 1.5e-8;
 pub struct Reached {
     /// Error in the energy norm: that of the layers from the duality gap, that of the linear step from its solver.
     pub error: f64,
-    /// Whether `error` is a bound: no pressure of a layer that lets go is negative, and the linear step is exact to rounding.
+    /// Whether `error` is a bound: no pressure of a layer that lets go is negative, and the linear step is exact to
+    /// rounding.
     pub is_bound: bool,
-    /// Error of the pressures. It is the largest difference from the law, relative to the largest pressure, or the error of an inexact linear
-    /// step, relative to the energy of the contact alone.
+    /// Error of the pressures. It is the largest difference from the law, relative to the largest pressure, or the
+    /// error of an inexact linear step, relative to the energy of the contact alone.
     pub pressure: f64,
-    /// Forces out of balance on a body, as a share of its contact forces: the largest over all bodies, by the pressures of the layers, which are
-    /// the result.
+    /// Forces out of balance on a body, as a share of its contact forces: the largest over all bodies, by the pressures
+    /// of the layers, which are the result.
     pub imbalance: f64,
 }
 
-/// Return the energy that the pressures give the layers and the surfaces under them, sum omega p^2 (1/kappa + 1/rho0). The energy of the whole
-/// bodies may be much larger, and an error that is small relative to that one may be large for the pressures.
+/// Return the energy that the pressures give the layers and the surfaces under them, sum omega p^2 (1/kappa + 1/rho0).
+/// The energy of the whole bodies may be much larger, and an error that is small relative to that one may be large for
+/// the pressures.
 pub(super) fn contact_energy(model: &Model, layer: &Layer) -> f64 {
     let slopes = surface_slopes(model);
     let at = |q: usize| layer.force[q] * layer.pressure[q] * (layer.tangent[q].recip() + slopes[q].recip());
@@ -64,12 +66,12 @@ fn nearest(law: &dyn LayerLaw, point: usize, c: f64, roundoff: f64, p: f64) -> f
 }
 
 impl Reached {
-    /// Measure an iterate with u'Ku = `strain` after the linear step `step`. `state` is its equilibrium, `layer` has the resolved states on the
-    /// laws.
+    /// Measure an iterate with u'Ku = `strain` after the linear step `step`. `state` is its equilibrium, `layer` has
+    /// the resolved states on the laws.
     ///
-    /// A compression is known only to its roundoff. Of the admissible values, the one that is closest to the law is used: a stiff law would answer
-    /// roundoff with any pressure. Where a pressure is negative, the gap is infinite, and the work of its change to the resolved state
-    /// replaces the gap.
+    /// A compression is known only to its roundoff. Of the admissible values, the one that is closest to the law is
+    /// used: a stiff law would answer roundoff with any pressure. Where a pressure is negative, the gap is infinite,
+    /// and the work of its change to the resolved state replaces the gap.
     pub(super) fn new(
         model: &Model,
         scale: &Scale,
@@ -102,12 +104,14 @@ impl Reached {
         }
     }
 
-    /// Verify the equilibrium after a step that its solver takes for exact: f - K u - B' omega p has the relative energy norm `unbalanced`.
+    /// Verify the equilibrium after a step that its solver takes for exact: f - K u - B' omega p has the relative
+    /// energy norm `unbalanced`.
     pub(super) fn verify(&mut self, unbalanced: f64) {
         self.is_bound &= unbalanced <= EXACT;
     }
 
-    /// Add twice what is left of equilibrium after a step from the states `before` to `layer`. The solution `more` with the same matrix shows it.
+    /// Add twice what is left of equilibrium after a step from the states `before` to `layer`. The solution `more` with
+    /// the same matrix shows it.
     pub(super) fn add_unbalanced(
         &mut self,
         (scale, strain): (&Scale, f64),
@@ -135,14 +139,16 @@ impl Reached {
 ///
 /// They are energies, pressures and forces by which a contact that vanishes is measured.
 ///
-/// Unconstrained bodies that only an initial overlap presses together move apart until no pressure is left. Then everything that a relative
-/// tolerance could refer to vanishes with the error, and rest or the automatic start is the reference. Its layers may answer an overlap with any
-/// pressure, so the surfaces deflect first ([`start::at`]). Under loads the start alone is the reference: an overlap says nothing of the pressures that
-/// carry them. A contact may also vanish while bodies carry other loads. Then the reference is the energy
-/// of their strains, as a pressure on all surfaces.
+/// Unconstrained bodies that only an initial overlap presses together move apart until no pressure is left. Then
+/// everything that a relative tolerance could refer to vanishes with the error, and rest or the automatic start is the
+/// reference. Its layers may answer an overlap with any pressure, so the surfaces deflect first ([`start::at`]). Under
+/// loads the start alone is the reference: an overlap says nothing of the pressures that carry them. A contact may also
+/// vanish while bodies carry other loads. Then the reference is the energy of their strains, as a pressure on all
+/// surfaces.
 ///
-/// A solution below [`PART`] of a reference is measured by that share of it. With a tolerance of 1e-8 this is 1e-14 of what the bodies carry, which
-/// is lost in the rounding of their forces. A start that the scene gives is no reference, because it may be any displacement.
+/// A solution below [`PART`] of a reference is measured by that share of it. With a tolerance of 1e-8 this is 1e-14 of
+/// what the bodies carry, which is lost in the rounding of their forces. A start that the scene gives is no reference,
+/// because it may be any displacement.
 #[derive(Debug, Clone, Default)]
 pub struct Scale {
     /// Energy: u'Ku + sum omega p c.
@@ -178,8 +184,8 @@ impl Scale {
         scale
     }
 
-    /// Take note of displacements of the surfaces (trace, 2n): [`PART`] of them, as deflections, are a reference, too. Supports may move a body as a whole
-    /// and without contact, so that strains are the rounding of zero.
+    /// Take note of displacements of the surfaces (trace, 2n): [`PART`] of them, as deflections, are a reference, too.
+    /// Supports may move a body as a whole and without contact, so that strains are the rounding of zero.
     pub fn note_displacements(&mut self, trace: &[f64]) {
         let (one, other) = trace.split_at(self.foundation.len());
         let energy =
@@ -192,16 +198,16 @@ impl Scale {
         energy.max(self.energy).max(self.moved)
     }
 
-    /// Whether an energy is infinite, or so small that its rounding, eps^2 of it, is below the range of numbers. A zero energy is out of range if the
-    /// layers carry pressures, up to `peak`.
+    /// Whether an energy is infinite, or so small that its rounding, eps^2 of it, is below the range of numbers. A zero
+    /// energy is out of range if the layers carry pressures, up to `peak`.
     pub fn is_out_of_range(&self, energy: f64, peak: f64) -> bool {
         const LEAST: f64 = f64::MIN_POSITIVE / (f64::EPSILON * f64::EPSILON);
         let energy = self.energy(energy);
         if energy == 0.0 { peak > 0.0 } else { !(LEAST..f64::INFINITY).contains(&energy) }
     }
 
-    /// The relative residual: root of `numerator` = r'G^-1 r over `reference` = u'Ku + sum omega p c. A zero reference asks for
-    /// an absolute zero.
+    /// The relative residual: root of `numerator` = r'G^-1 r over `reference` = u'Ku + sum omega p c. A zero reference
+    /// asks for an absolute zero.
     pub fn relative(&self, numerator: f64, reference: f64) -> f64 {
         if numerator.is_nan() || reference.is_nan() {
             return f64::NAN;
@@ -210,21 +216,24 @@ impl Scale {
         if numerator <= 0.0 { 0.0 } else { (numerator / self.energy(reference)).sqrt() }
     }
 
-    /// Return [`PART`] of the pressure that gives all contact surfaces the energy u'Ku of the bodies. The pressure of soft layers between stiff bodies
-    /// is no measure of what the bodies carry.
+    /// Return [`PART`] of the pressure that gives all contact surfaces the energy u'Ku of the bodies. The pressure of
+    /// soft layers between stiff bodies is no measure of what the bodies carry.
     fn stress(&self, strain: f64) -> f64 {
         if self.compliance > 0.0 { PART * (strain.max(0.0) / self.compliance).sqrt() } else { 0.0 }
     }
 
-    /// Return the pressure by which errors of pressures are measured in bodies with u'Ku = `strain`: the largest one (n), or the least scale.
+    /// Return the pressure by which errors of pressures are measured in bodies with u'Ku = `strain`: the largest one
+    /// (n), or the least scale.
     pub fn peak(&self, pressure: &[f64], strain: f64) -> f64 {
         pressure.iter().map(|p| p.abs()).fold(self.pressure.max(self.stress(strain)), f64::max)
     }
 
-    /// Return the forces out of balance on a body under the contact forces `force` (n), relative to these forces: the largest over all rigid motions
-    /// that supports leave free. `strain` is u'Ku over all bodies. For such a motion m, K m = 0, so that only loads and contact forces work on it.
+    /// Return the forces out of balance on a body under the contact forces `force` (n), relative to these forces: the
+    /// largest over all rigid motions that supports leave free. `strain` is u'Ku over all bodies. For such a motion m,
+    /// K m = 0, so that only loads and contact forces work on it.
     ///
-    /// The residual shows too little of an imbalance where the Robin term that holds the body is much stiffer than the layer.
+    /// The residual shows too little of an imbalance where the Robin term that holds the body is much stiffer than the
+    /// layer.
     pub fn imbalance(&self, model: &Model, force: &[f64], strain: f64) -> f64 {
         let mut most = 0.0f64;
         let least = self.force.max(self.area * self.stress(strain));
@@ -243,20 +252,23 @@ impl Scale {
     }
 }
 
-/// Return the error of every compression c = u_a + u_b - d by rounding of the gap d and of both displacements, n. `trace` is a trace vector (2n).
+/// Return the error of every compression c = u_a + u_b - d by rounding of the gap d and of both displacements, n.
+/// `trace` is a trace vector (2n).
 pub(super) fn compression_roundoff(model: &Model, trace: &[f64]) -> Vec<f64> {
     let points = model.points();
     let terms = |q: usize| trace[q].abs() + trace[points + q].abs() + model.gap[q].abs();
     (0..points).map(|q| f64::EPSILON * terms(q)).collect()
 }
 
-/// Return the largest error of a pressure by rounding of the gap and of both displacements, relative to the `peak` by which pressures are
-/// measured. Traces and gaps are sums, which are rounded before they are added, so that the roundoff of a compression counts twice. `trace` is a trace vector (2n); `answer`, n, is the stiffness per area with which the bodies answer an error of the gap.
+/// Return the largest error of a pressure by rounding of the gap and of both displacements, relative to the `peak` by
+/// which pressures are measured. Traces and gaps are sums, which are rounded before they are added, so that the
+/// roundoff of a compression counts twice. `trace` is a trace vector (2n); `answer`, n, is the stiffness per area with
+/// which the bodies answer an error of the gap.
 ///
-/// Where bodies fall far, the origin keeps the digits of every iterate, but the gap is data with the digits that it has. Layer and bodies answer an
-/// error of the gap like springs in series, 1/(1/kappa + 1/answer). In Newton's method pressures are in equilibrium, the bodies answer with their
-/// surfaces, and layer states lie on lines of slope rho. Sweeps take pressures from compressions, so that the layer answers alone: `answer` is
-/// infinite.
+/// Where bodies fall far, the origin keeps the digits of every iterate, but the gap is data with the digits that it
+/// has. Layer and bodies answer an error of the gap like springs in series, 1/(1/kappa + 1/answer). In Newton's method
+/// pressures are in equilibrium, the bodies answer with their surfaces, and layer states lie on lines of slope rho.
+/// Sweeps take pressures from compressions, so that the layer answers alone: `answer` is infinite.
 pub(super) fn pressure_roundoff(model: &Model, trace: &[f64], layer: &Layer, answer: &[f64], peak: f64) -> f64 {
     let roundoff = compression_roundoff(model, trace);
     let error = |q: usize| in_series(layer.tangent[q], answer[q]) * roundoff[q];

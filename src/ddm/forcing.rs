@@ -1,4 +1,5 @@
-//! The linear step of Newton's method: its springs, and the forcing term, which says how well an iterative solver solves it.
+//! The linear step of Newton's method: its springs, and the forcing term, which says how well an iterative solver
+//! solves it.
 
 use super::bound::{Scale, contact_energy, surface_energy};
 use crate::error::Result;
@@ -9,16 +10,18 @@ use crate::model::linear::{Failure, LinearStep, System, Trial};
 use crate::model::rigid::Motions;
 use std::collections::VecDeque;
 
-/// Iterations over which the change of the pressures estimates their error before these iterations, as the gain of energy does (Hestenes and
-/// Stiefel, 1952); the error after them is several times smaller. Tried were 2, 3 and 4 iterations and shares of 0.1 to 1 of the distance from the
-/// laws, on 13 scenes of spheres, grooves, a flange and rollers. Three iterations and the whole distance took the fewest iterations among those that
-/// needed no more steps than exact ones.
+/// Iterations over which the change of the pressures estimates their error before these iterations, as the gain of
+/// energy does (Hestenes and Stiefel, 1952); the error after them is several times smaller. Tried were 2, 3 and 4
+/// iterations and shares of 0.1 to 1 of the distance from the laws, on 13 scenes of spheres, grooves, a flange and
+/// rollers. Three iterations and the whole distance took the fewest iterations among those that needed no more steps
+/// than exact ones.
 const DELAY: usize = 3;
 
 /// The stopping test of a linear step.
 ///
-/// The forcing rule: an inexact linear step of Newton's method ends when the error of the linear solver is small compared with the distance from
-/// the laws (Ern and Vohralík, Adaptive inexact Newton methods, 2013). Both are known after each iteration of the linear solver.
+/// The forcing rule: an inexact linear step of Newton's method ends when the error of the linear solver is small
+/// compared with the distance from the laws (Ern and Vohralík, Adaptive inexact Newton methods, 2013). Both are known
+/// after each iteration of the linear solver.
 pub(super) struct Forcing<'a> {
     /// Layer states from which the step is taken.
     layer: &'a Layer,
@@ -37,8 +40,8 @@ pub(super) struct Forcing<'a> {
 }
 
 impl<'a> Forcing<'a> {
-    /// Return the test for the step from these layer states and compressions (n), in a run that ends at a tolerance, by a solver with this
-    /// [`roughest`](crate::model::linear::LinearStep::roughest) step.
+    /// Return the test for the step from these layer states and compressions (n), in a run that ends at a tolerance, by
+    /// a solver with this [`roughest`](crate::model::linear::LinearStep::roughest) step.
     pub fn new(
         layer: &'a Layer,
         before: Vec<f64>,
@@ -49,8 +52,8 @@ impl<'a> Forcing<'a> {
         Self { layer, rho, tolerance, scale, roughest, pressures: VecDeque::from([layer.linear(&before)]), before }
     }
 
-    /// Whether a step is solved well enough: the pressures change by less than their distance from the laws, or by less than the error that ends
-    /// the run.
+    /// Whether a step is solved well enough: the pressures change by less than their distance from the laws, or by less
+    /// than the error that ends the run.
     pub fn is_enough(&mut self, model: &Model, trial: &Trial) -> bool {
         let c: Vec<f64> = self.before.iter().zip(trial.closing).map(|(c, closing)| c + closing).collect();
         let p = self.layer.linear(&c);
@@ -78,8 +81,9 @@ impl<'a> Forcing<'a> {
     }
 }
 
-/// Return the response w of the bodies and their layers to small loads r, (K + B' diag(omega kappa) B) w = r, and its squared energy norm. The
-/// layers are in the states `layer`. `loads` is r, one entry per dof of each body that lives on this rank. The relative error of w may be `share`.
+/// Return the response w of the bodies and their layers to small loads r, (K + B' diag(omega kappa) B) w = r, and its
+/// squared energy norm. The layers are in the states `layer`. `loads` is r, one entry per dof of each body that lives
+/// on this rank. The relative error of w may be `share`.
 pub fn respond(
     model: &mut Model,
     step: &mut dyn LinearStep,
@@ -105,9 +109,10 @@ pub fn respond(
     Ok(step.solve(system)?.map(|solution| (solution.field, solution.energy + work[0])))
 }
 
-/// Stiffness, as a share of the springs of whole surfaces, that resists motions which no closed contact resists: such motions then go far, but not
-/// without end. How far is not what this share decides: where these springs carry a force, a descent chooses the length of the step. With 1e-2 and 1e-4, 120
-/// random scenes, usual, wide and slender, take the same steps.
+/// Stiffness, as a share of the springs of whole surfaces, that resists motions which no closed contact resists: such
+/// motions then go far, but not without end. How far is not what this share decides: where these springs carry a force,
+/// a descent chooses the length of the step. With 1e-2 and 1e-4, 120 random scenes, usual, wide and slender, take the
+/// same steps.
 const STAND_IN: f64 = 1e-3;
 
 /// The springs of a linear step.
@@ -118,12 +123,13 @@ pub struct Springs {
     pub added: Vec<f64>,
 }
 
-/// Return the springs omega kappa of a linear step from `layer`, n, with one more for every rigid motion of the bodies together that is otherwise
-/// unresisted: a contact that is still open may stop it.
+/// Return the springs omega kappa of a linear step from `layer`, n, with one more for every rigid motion of the bodies
+/// together that is otherwise unresisted: a contact that is still open may stop it.
 ///
-/// The additional spring is at one point, and nowhere else. Forces may be in balance on the motion, for example where bodies rest and could turn about
-/// the closed points. Then a single spring carries nothing, and the step is exact; several springs would carry forces. Of the points that the motion closes
-/// at least half as much as any, it is that of the least gap: over a wide one it would tie the body to another that a support carries along.
+/// The additional spring is at one point, and nowhere else. Forces may be in balance on the motion, for example where
+/// bodies rest and could turn about the closed points. Then a single spring carries nothing, and the step is exact;
+/// several springs would carry forces. Of the points that the motion closes at least half as much as any, it is that of
+/// the least gap: over a wide one it would tie the body to another that a support carries along.
 pub fn resisting(model: &Model, layer: &Layer) -> Springs {
     let (motions, mut all, mut added) = (Motions::of(model), layer.springs(model), vec![0.0; model.points()]);
     // compared with a new spring, softer ones may be rounding, so that another motion is unresisted

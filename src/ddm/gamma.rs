@@ -77,7 +77,8 @@ impl GammaRule for LineSearch {
 
 /// gamma^k = -gamma^{k-1} z^{k-1}.(z^k - z^{k-1}) / |z^k - z^{k-1}|^2 on the traces: the secant of the fixed point map.
 ///
-/// A value outside of (0, 10), as where contact changes the most, is replaced by the exact line search: a secant that goes farther than ten steps extrapolates.
+/// A value outside of (0, 10), as where contact changes the most, is replaced by the exact line search: a secant that
+/// goes farther than ten steps extrapolates.
 #[derive(Debug, Default)]
 pub struct Aitken {
     last: Option<(f64, Vec<f64>)>,

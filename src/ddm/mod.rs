@@ -1,8 +1,9 @@
 //! The method: Robin-Robin domain decomposition for the nonlinear variational equation (26).
 //!
-//! There are two loops, each one screen: that of the paper ([`robin`]), and Newton's method (`newton`). They work on arrays over the contact
-//! points (compression, pressure, tangent, area) and on the bodies of a [`Model`](crate::model::Model). They know no dimension, no
-//! element and no mesh. Where a function says nothing else, its errors are failures of the solver library; not converging is a [`Status`].
+//! There are two loops, each one screen: that of the paper ([`robin`]), and Newton's method (`newton`). They work on
+//! arrays over the contact points (compression, pressure, tangent, area) and on the bodies of a
+//! [`Model`](crate::model::Model). They know no dimension, no element and no mesh. Where a function says nothing else,
+//! its errors are failures of the solver library; not converging is a [`Status`].
 //!
 //! # The constants of Newton's method
 //!

@@ -8,9 +8,9 @@
 //! layer states   the point of the law with c_q + p_q/rho = c + p/rho          (resolvent, Minty)
 //! ```
 //!
-//! A fixed point has c = c_q and p = p_q: the equations (26). The gap between (c, p) and the law bounds the error of u. Where steps have to be
-//! shortened, the laws are smoothed for a while ([`Path`](super::step::Path)); where no part of a step comes nearer to the laws, F1 falls instead
-//! ([`Newton::descend`]).
+//! A fixed point has c = c_q and p = p_q: the equations (26). The gap between (c, p) and the law bounds the error of u.
+//! Where steps have to be shortened, the laws are smoothed for a while ([`Path`](super::step::Path)); where no part of
+//! a step comes nearer to the laws, F1 falls instead ([`Newton::descend`]).
 
 use super::bound::{EXACT, Reached, compression_roundoff};
 use super::forcing::{Forcing, resisting};
@@ -26,24 +26,26 @@ use crate::model::field::{Field, LineEnergy, residual, unbalanced};
 use crate::model::layer::Layer;
 use crate::model::linear::{LinearResult, LinearSolution, LinearStep, System, Trial};
 
-/// Relative error of the linear system that shows what is left of equilibrium: its size is wanted, which is then known to a factor of two.
+/// Relative error of the linear system that shows what is left of equilibrium: its size is wanted, which is then known
+/// to a factor of two.
 const LOOK: f64 = 0.5;
 
-/// Relative error above which the first linear step from the states of another solution does not end. Displacements are zero before it, and the
-/// first iterations of a solver leave them so far from the laws that [`Forcing`] would take them for settled, with all points closed. The last adapted
-/// meshes of a bearing cap and of a fishplate take 2 steps, instead of 10 and 6. With 0.03 and 0.01 the cap takes 3 and 2 steps, and more
-/// iterations. Spheres, flanges, a T-slot nut and a clamp take as many steps as without this limit.
+/// Relative error above which the first linear step from the states of another solution does not end. Displacements are
+/// zero before it, and the first iterations of a solver leave them so far from the laws that [`Forcing`] would take
+/// them for settled, with all points closed. The last adapted meshes of a bearing cap and of a fishplate take 2 steps,
+/// instead of 10 and 6. With 0.03 and 0.01 the cap takes 3 and 2 steps, and more iterations. Spheres, flanges, a T-slot
+/// nut and a clamp take as many steps as without this limit.
 const FIRST_STEP: f64 = 0.1;
 
 /// Share of the tolerance below which an error in the energy norm changes nothing in the digits that are asked for.
 const UNSEEN: f64 = 0.01;
 
-/// Distance from 1 of the length of a descent at which the descent ends. Lengths tend to 1 where Newton's method for F1 converges fast. With 0.2 none of
-/// 900 random scenes and none of 320 scenes with saturating layers was lost.
+/// Distance from 1 of the length of a descent at which the descent ends. Lengths tend to 1 where Newton's method for F1
+/// converges fast. With 0.2 none of 900 random scenes and none of 320 scenes with saturating layers was lost.
 const WHOLE_STEP: f64 = 0.2;
 
-/// Iterate from displacements and layer states until a rule ends the run. `is_near` is whether the states are those of another solution, while the
-/// displacements are still at rest.
+/// Iterate from displacements and layer states until a rule ends the run. `is_near` is whether the states are those of
+/// another solution, while the displacements are still at rest.
 pub(super) fn iterate(
     run: &mut Run,
     linear: &mut dyn LinearStep,
@@ -204,22 +206,24 @@ impl Newton<'_, '_> {
         self.progress.step_length(model, &self.states, [&before, &roundoff], [&whole, &pressure])
     }
 
-    /// Return whether springs that stand in for a contact take more of a step's energy than the accuracy of a line search. The step then has the direction
-    /// in which loads push the bodies, but a length that those springs chose, which says nothing of where the bodies meet.
+    /// Return whether springs that stand in for a contact take more of a step's energy than the accuracy of a line
+    /// search. The step then has the direction in which loads push the bodies, but a length that those springs chose,
+    /// which says nothing of where the bodies meet.
     fn is_unresisted(&self, step: &LinearSolution) -> bool {
         let closing = step.field.closing();
         let taken: f64 = self.added.iter().zip(closing).map(|(spring, s)| spring * s.powi(2)).sum();
         taken > SEARCH * step.energy
     }
 
-    /// Let F1 fall by Newton's method for F1 itself, to its least along each step, until whole steps are taken. Return whether it fell; then the next
-    /// step begins from the states at the new compressions.
+    /// Let F1 fall by Newton's method for F1 itself, to its least along each step, until whole steps are taken. Return
+    /// whether it fell; then the next step begins from the states at the new compressions.
     ///
-    /// The distance from the laws falls along no step whose tangents nearly vanish, as where a law saturates or hardly anything holds a body. F1 is convex,
-    /// and a step of Newton's method always descends. The least F1 may be at a tiny part of the step, which halving would not find.
+    /// The distance from the laws falls along no step whose tangents nearly vanish, as where a law saturates or hardly
+    /// anything holds a body. F1 is convex, and a step of Newton's method always descends. The least F1 may be at a
+    /// tiny part of the step, which halving would not find.
     ///
-    /// A descent begins where the last one ended, or at the iterate if F1 is less there, and takes at least as many steps as all before. So F1 falls
-    /// to its minimum if whole steps lead away from it again and again.
+    /// A descent begins where the last one ended, or at the iterate if F1 is less there, and takes at least as many
+    /// steps as all before. So F1 falls to its minimum if whole steps lead away from it again and again.
     fn descend(&mut self) -> Result<bool> {
         let here = self.position();
         let begin = if here.f1 <= self.lowest.f1 { here.clone() } else { self.lowest.clone() };
@@ -253,8 +257,9 @@ impl Newton<'_, '_> {
         exchange::asked(&sums) != 0
     }
 
-    /// Take one step of Newton's method for F1 from the states at the compressions of the iterate. Return its length; zero if its linear system
-    /// is not solved, if F1 falls without end, or if the whole step promises a fall of less than `unseen`.
+    /// Take one step of Newton's method for F1 from the states at the compressions of the iterate. Return its length;
+    /// zero if its linear system is not solved, if F1 falls without end, or if the whole step promises a fall of less
+    /// than `unseen`.
     fn descent_step(&mut self, unseen: f64) -> Result<f64> {
         let model = &mut *self.run.model;
         let layer = Layer::at(model, &self.u.trace);
@@ -290,7 +295,8 @@ impl Newton<'_, '_> {
         step.field.scale(part.length);
         self.u.advance(model, 1.0, &step.field);
         self.u.retrace(model);
-        // pressures of the linear step, not of the compressions at its end: a stiff layer would magnify the roundoff of displacements
+        // pressures of the linear step, not of the compressions at its end: a stiff layer would magnify the roundoff of
+        // displacements
         let pressure = self.progress.go(part.length, self.states.linear(&whole));
         let rho = self.progress.slopes(model, &self.states);
         let compression = model.compression(&self.u.trace);
@@ -333,8 +339,9 @@ impl Newton<'_, '_> {
         self.run.sum(energy, unbalanced)
     }
 
-    /// Look at the equilibrium of an iterate once more: one linear system, with the matrix of the step, for the forces that are left. Add twice the size of
-    /// its solution to the errors, since roundoff may do as much again. Return the solution, none if the system is not solved.
+    /// Look at the equilibrium of an iterate once more: one linear system, with the matrix of the step, for the forces
+    /// that are left. Add twice the size of its solution to the errors, since roundoff may do as much again. Return the
+    /// solution, none if the system is not solved.
     fn look(&mut self, iterate: &StepResult, measured: &mut Measured) -> Result<Option<LinearSolution>> {
         let (run, layer) = (&mut *self.run, &self.states);
         let springs = resisting(run.model, layer);
@@ -352,8 +359,8 @@ impl Newton<'_, '_> {
 
     /// Show the row of an iterate and keep it. Return the status if the run ends with this iterate.
     ///
-    /// An iterate that seems good enough, or makes no progress any more, has its equilibrium looked at. If too much is left, further steps go on, which take
-    /// it into account. Roundoff ends a run that stagnates on the laws.
+    /// An iterate that seems good enough, or makes no progress any more, has its equilibrium looked at. If too much is
+    /// left, further steps go on, which take it into account. Roundoff ends a run that stagnates on the laws.
     fn check_termination(&mut self, iterate: &StepResult, measured: &mut Measured) -> Result<Option<Status>> {
         let is_smoothed = !self.states.smoothing.is_empty();
         let is_enough = |error: f64| self.run.stop.residual.is_some_and(|tolerance| error <= tolerance);
@@ -417,9 +424,10 @@ impl Newton<'_, '_> {
     fn update_states(&mut self, iterate: &StepResult, measured: &Measured) {
         let (unseen, model) = (self.unseen(measured, iterate), &*self.run.model);
         let smoothing = self.progress.path.smoothing(model, &iterate.equilibrium(), &self.states.smoothing, unseen);
-        self.states = match smoothing.is_empty() {
-            true => iterate.resolved.clone(),
-            false => Layer::resolve(model, &iterate.compression, &iterate.pressure, &iterate.rho, &smoothing),
+        self.states = if smoothing.is_empty() {
+            iterate.resolved.clone()
+        } else {
+            Layer::resolve(model, &iterate.compression, &iterate.pressure, &iterate.rho, &smoothing)
         };
     }
 

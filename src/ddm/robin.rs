@@ -135,7 +135,8 @@ fn sums(a: &[Vec<f64>], b: &[Vec<f64>]) -> Vec<Vec<f64>> {
     a.iter().zip(b).map(|(a, b)| a.iter().zip(b).map(|(a, b)| a + b).collect()).collect()
 }
 
-/// Iterate from a displacement until a rule ends the run. With `wants_interval` the interval (33) of gamma is found at the end.
+/// Iterate from a displacement until a rule ends the run. With `wants_interval` the interval (33) of gamma is found at
+/// the end.
 pub(super) fn iterate(
     run: &mut Run,
     rule: &mut dyn GammaRule,
@@ -191,7 +192,8 @@ pub(super) fn iterate(
 
 /// Complete the row of an iterate u. Return the first body with a displacement that is not finite.
 ///
-/// The slowest mode remains after a while, and corrections decrease by its factor 1 - gamma lambda. Then the squared error in the energy norm is r'z/lambda.
+/// The slowest mode remains after a while, and corrections decrease by its factor 1 - gamma lambda. Then the squared
+/// error in the energy norm is r'z/lambda.
 fn record(
     run: &mut Run,
     u: &Field,
@@ -239,8 +241,8 @@ fn status(run: &Run, layer: &Layer, sweep: &Sweep, settling: &Settling, broken: 
     (sweep.asked != 0).then_some(Status::Interrupted { asked: sweep.asked })
 }
 
-/// Whether the pressures of an iterate have settled and its forces balance, to the tolerance that is asked for. The residual alone is not enough: a slow
-/// mode has a small residual and a large error.
+/// Whether the pressures of an iterate have settled and its forces balance, to the tolerance that is asked for. The
+/// residual alone is not enough: a slow mode has a small residual and a large error.
 fn is_settled(run: &Run, layer: &Layer, strain: f64, settling: &Settling, residual: f64) -> bool {
     let peak = run.scale.peak(&layer.pressure, strain);
     let imbalance = run.scale.imbalance(run.model, &layer.force, strain);
@@ -261,9 +263,10 @@ fn found_interval(run: &mut Run, layer: &Layer) -> Result<Option<Interval>> {
 ///
 /// They estimate the error of the pressures from their change while the residual fell.
 ///
-/// A last step that moves nothing proves little. It may have been short, or along modes that do not change the contact, while other modes are far
-/// from their end. In the long run, errors fall as the residual does. While the residual falls to a share s of its earlier value, a pressure
-/// changes by 1 - s of its earlier error. So s/(1 - s) of that change is left as its error.
+/// A last step that moves nothing proves little. It may have been short, or along modes that do not change the contact,
+/// while other modes are far from their end. In the long run, errors fall as the residual does. While the residual
+/// falls to a share s of its earlier value, a pressure changes by 1 - s of its earlier error. So s/(1 - s) of that
+/// change is left as its error.
 #[derive(Debug, Default)]
 struct Settling {
     /// Residual and pressures, n, of each.
@@ -271,8 +274,9 @@ struct Settling {
 }
 
 impl Settling {
-    /// Estimate the largest error of the pressures `now` (n) of an iterate with this residual; zero if it is the first one. Changes above their `peak`
-    /// count as the peak: laws are far from linear there, so that larger errors say nothing about those that follow.
+    /// Estimate the largest error of the pressures `now` (n) of an iterate with this residual; zero if it is the first
+    /// one. Changes above their `peak` count as the peak: laws are far from linear there, so that larger errors say
+    /// nothing about those that follow.
     fn error(&self, residual: f64, now: &[f64], peak: f64) -> f64 {
         // from a good start the residual may never have fallen so far
         let earlier = self.past.iter().rfind(|(earlier, _)| residual <= DIGIT * earlier).or(self.past.first());

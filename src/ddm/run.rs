@@ -49,8 +49,8 @@ pub struct Outcome {
     pub linear_step: String,
     /// Largest error of a pressure by rounding of gaps and displacements, relative to the scale of errors of pressures.
     pub rounding: f64,
-    /// Energy norm of the forces f - K u - B' omega p of each node alone, relative to the energy of bodies and layers. It is computed with K itself,
-    /// and is about a lower bound of the error that the forces cause.
+    /// Energy norm of the forces f - K u - B' omega p of each node alone, relative to the energy of bodies and layers.
+    /// It is computed with K itself, and is about a lower bound of the error that the forces cause.
     pub unbalanced: f64,
     /// The interval (33) of gamma, if it was asked for and can be found.
     pub interval: Option<Interval>,
@@ -97,8 +97,8 @@ impl Run<'_> {
         sums
     }
 
-    /// Complete the row of an iterate u, show it and keep it. `moved` is the step of the traces that led to u (2n), none for a start. Return the first body
-    /// with a trace that is not finite.
+    /// Complete the row of an iterate u, show it and keep it. `moved` is the step of the traces that led to u (2n),
+    /// none for a start. Return the first body with a trace that is not finite.
     pub fn record(&mut self, u: &Field, moved: Option<&[f64]>, row: Row) -> Option<usize> {
         let mut trace = rigid::trace(self.model, &u.rigid);
         axpy(1.0, &u.trace, &mut trace);
@@ -128,7 +128,8 @@ pub struct Row {
     pub step: usize,
     /// k: updates made so far.
     pub iteration: usize,
-    /// The number that ends the run (docs/theory.md): for sweeps the relative residual of the iterate, for Newton's method its relative error.
+    /// The number that ends the run (docs/theory.md): for sweeps the relative residual of the iterate, for Newton's
+    /// method its relative error.
     pub residual: f64,
     /// Largest of `increments`; NaN in row 0, before the first update.
     pub increment: f64,
@@ -136,8 +137,8 @@ pub struct Row {
     pub error: f64,
     /// Whether `error` is a bound; otherwise it is an estimate.
     pub is_bound: bool,
-    /// The paper's rho of each body, in the order of the scene: relative increment of the normal displacements in the step that led to this
-    /// iterate.
+    /// The paper's rho of each body, in the order of the scene: relative increment of the normal displacements in the
+    /// step that led to this iterate.
     pub increments: Vec<f64>,
     /// Relaxation, or length of the step, that led to this iterate; NaN in row 0.
     pub gamma: f64,
@@ -163,8 +164,9 @@ pub struct Row {
 pub trait Observer {
     /// Take a complete row.
     fn row(&mut self, row: &Row);
-    /// Return the signals that ask the run to end, as `exchange::ASKS` bits whose meaning is the caller's own; called once an iterate. Those of one rank
-    /// reach all ranks, and the run ends with [`Status::Interrupted`](super::Status::Interrupted).
+    /// Return the signals that ask the run to end, as `exchange::ASKS` bits whose meaning is the caller's own; called
+    /// once an iterate. Those of one rank reach all ranks, and the run ends with
+    /// [`Status::Interrupted`](super::Status::Interrupted).
     fn asked(&self) -> u8 {
         0
     }

@@ -1,4 +1,5 @@
-//! A run from its start to its result, by either loop. The start is given by the scene, found by itself, or left by another run.
+//! A run from its start to its result, by either loop. The start is given by the scene, found by itself, or left by
+//! another run.
 
 use super::bound::{EXACT, Scale, pressure_roundoff};
 use super::forcing::resisting;
@@ -60,8 +61,8 @@ impl Method {
     }
 }
 
-/// Run a method on a model from its start until a rule ends it. With `wants_interval` the interval (33) of gamma is found at the end, which takes
-/// some sweeps.
+/// Run a method on a model from its start until a rule ends it. With `wants_interval` the interval (33) of gamma is
+/// found at the end, which takes some sweeps.
 pub fn solve(
     model: &mut Model,
     method: &mut Method,
@@ -144,7 +145,8 @@ impl Run<'_> {
         loaded[0] > 0.0
     }
 
-    /// Return the amounts of the free motions of each body in a start. Bodies on springs begin at rest, since springs resist some of the motions of the start.
+    /// Return the amounts of the free motions of each body in a start. Bodies on springs begin at rest, since springs
+    /// resist some of the motions of the start.
     fn motions_of(&self, amounts: &DVector<f64>) -> Vec<Vec<f64>> {
         let mut amounts = Motions::with_springs(self.model).of_bodies(amounts);
         for (amounts, slot) in amounts.iter_mut().zip(&self.model.bodies).filter(|(_, slot)| slot.sprung.is_some()) {
@@ -175,7 +177,8 @@ impl Run<'_> {
         }
     }
 
-    /// Return the status of a run that ended as solved, from what is left of the forces, and what roundoff makes of the pressures.
+    /// Return the status of a run that ended as solved, from what is left of the forces, and what roundoff makes of the
+    /// pressures.
     fn judge(&self, end: &Outcome, rounding: f64) -> Status {
         let energy = end.strain + end.layer.work;
         if self.scale.is_out_of_range(energy, end.layer.peak()) {
@@ -197,8 +200,8 @@ impl Run<'_> {
     }
 }
 
-/// A run reports unbalanced forces, or the roundoff of pressures, if they are larger than this number of tolerances. The norms in which the two are measured
-/// differ by less than a factor of ten.
+/// A run reports unbalanced forces, or the roundoff of pressures, if they are larger than this number of tolerances.
+/// The norms in which the two are measured differ by less than a factor of ten.
 const TIMES: f64 = 10.0;
 
 /// The start of a run.
@@ -231,8 +234,8 @@ impl From<Option<Vec<f64>>> for InitialGuess {
     }
 }
 
-/// Return the springs omega kappa (n) of the first linear step of Newton's method; none if there is no solution. An automatic start is replaced by
-/// the one that is found.
+/// Return the springs omega kappa (n) of the first linear step of Newton's method; none if there is no solution. An
+/// automatic start is replaced by the one that is found.
 pub fn first_springs(model: &Model, begin: &mut InitialGuess) -> Option<Vec<f64>> {
     let rigid = find_start(model).ok()?;
     let springs = resisting(model, &first_states(model, begin, &rigid).layer).all;
@@ -242,8 +245,8 @@ pub fn first_springs(model: &Model, begin: &mut InitialGuess) -> Option<Vec<f64>
     Some(springs)
 }
 
-/// Return the automatic start. If no method can find a solution, return the reason: a motion that nothing resists, or loads that push a body off
-/// for ever.
+/// Return the automatic start. If no method can find a solution, return the reason: a motion that nothing resists, or
+/// loads that push a body off for ever.
 fn find_start(model: &Model) -> std::result::Result<RigidStart, Status> {
     if let Some(mechanism) = &model.mechanism {
         return Err(Status::Mechanism(mechanism.clone()));
@@ -254,7 +257,8 @@ fn find_start(model: &Model) -> std::result::Result<RigidStart, Status> {
     start::find(model, None).map_err(|moving| Status::Unbounded { moving })
 }
 
-/// Return a motion of a body together with rigid parts that changes no gap, if there is one: the parts follow the body wherever it goes.
+/// Return a motion of a body together with rigid parts that changes no gap, if there is one: the parts follow the body
+/// wherever it goes.
 fn follows(model: &Model) -> Option<NamedMotion> {
     let motions = Motions::of(model);
     let has_rigid = |all: &Vec<NamedMotion>| all.iter().any(|moved| model.bodies[moved.body].is_rigid);
@@ -262,8 +266,8 @@ fn follows(model: &Model) -> Option<NamedMotion> {
     all.iter().map(|motion| motions.names(motion)).find(has_rigid)?.into_iter().next()
 }
 
-/// Return where a run begins: first states, the amounts of the free motions of all bodies that belong to them, and a trace. `rigid` is the automatic
-/// start.
+/// Return where a run begins: first states, the amounts of the free motions of all bodies that belong to them, and a
+/// trace. `rigid` is the automatic start.
 fn first_states(model: &Model, begin: &InitialGuess, rigid: &RigidStart) -> RigidStart {
     match begin {
         InitialGuess::Automatic | InitialGuess::Found(_) => rigid.clone(),

@@ -1,22 +1,25 @@
 //! The automatic start: rigid bodies on their own surfaces.
 //!
-//! The start solves the same problem with rigid bodies. The unknowns are the amounts a of the rigid motions E that supports leave free, and K
-//! consists of springs to the ground alone. Each layer is in series with a spring rho0, which stands for the surfaces of the two bodies: at the
-//! approach s of the rigid surfaces, the state (c, p) of the layer is the point of the law with c + p/rho0 = s. Let w be the work of the loads on
-//! E, and Pi the energy of layer and surfaces per area. Then the energy
+//! The start solves the same problem with rigid bodies. The unknowns are the amounts a of the rigid motions E that
+//! supports leave free, and K consists of springs to the ground alone. Each layer is in series with a spring rho0,
+//! which stands for the surfaces of the two bodies: at the approach s of the rigid surfaces, the state (c, p) of the
+//! layer is the point of the law with c + p/rho0 = s. Let w be the work of the loads on E, and Pi the energy of layer
+//! and surfaces per area. Then the energy
 //!
 //! ```text
 //! sum omega Pi(s) - w'a,      s = B E a - d,    Pi' = p,    0 <= Pi'' <= rho0
 //! ```
 //!
-//! is convex in a few unknowns per body, and its second derivatives are bounded whatever the law. The layer states at its minimum begin the
-//! iteration.
+//! is convex in a few unknowns per body, and its second derivatives are bounded whatever the law. The layer states at
+//! its minimum begin the iteration.
 //!
-//! The energy has no minimum exactly when loads push bodies away from everything that could stop them. Then there is a motion a that closes no
-//! contact, B E a <= 0, changes no bonded layer, B E a = 0 there, and gains work, w'a > 0 (Farkas). Elastic bodies then have no equilibrium either.
+//! The energy has no minimum exactly when loads push bodies away from everything that could stop them. Then there is a
+//! motion a that closes no contact, B E a <= 0, changes no bonded layer, B E a = 0 there, and gains work, w'a > 0
+//! (Farkas). Elastic bodies then have no equilibrium either.
 //!
-//! Two quantities count as zero below [`PART`] of what they could be. Forces out of balance: the elastic bodies change the start by more. Closings
-//! of a motion: rounding and proximal springs make some. A motion that is resisted at a meshed circle of 1000 edges closes 1e-5 of itself.
+//! Two quantities count as zero below [`PART`] of what they could be. Forces out of balance: the elastic bodies change
+//! the start by more. Closings of a motion: rounding and proximal springs make some. A motion that is resisted at a
+//! meshed circle of 1000 edges closes 1e-5 of itself.
 
 use crate::linalg::{Blocks, axpy, dot};
 use crate::model::Model;
@@ -36,18 +39,20 @@ pub struct RigidStart {
     pub trace: Vec<f64>,
 }
 
-/// Stiffness of the springs that resist every motion, as a share of rho0. With them, a step along a motion that no closed contact resists is finite,
-/// and the line search takes it as far as the next contact. A step then closes pressed contacts by this share of the opening of others, far less than [`PART`].
+/// Stiffness of the springs that resist every motion, as a share of rho0. With them, a step along a motion that no
+/// closed contact resists is finite, and the line search takes it as far as the next contact. A step then closes
+/// pressed contacts by this share of the opening of others, far less than [`PART`].
 const PROXIMAL: f64 = 1e-9;
 
 /// Most Newton steps; random scenes and walls of 4096 bricks take 2 to 20.
 const MOST_STEPS: usize = 200;
 
-/// Accuracy of line searches, relative to the first slope. A step is only a way to the next, and the energy falls with any accuracy below one.
+/// Accuracy of line searches, relative to the first slope. A step is only a way to the next, and the energy falls with
+/// any accuracy below one.
 pub(super) const SEARCH: f64 = 1e-3;
 
-/// Return the start of a model. The surfaces of the rigid bodies are displaced by the `given` trace (2n) or, without one, as the moved supports of
-/// their bodies impose it. These displacements count as shapes, not as motions.
+/// Return the start of a model. The surfaces of the rigid bodies are displaced by the `given` trace (2n) or, without
+/// one, as the moved supports of their bodies impose it. These displacements count as shapes, not as motions.
 ///
 /// # Errors
 /// The bodies and their motions along which the energy falls for ever, if there are such motions.
@@ -85,7 +90,8 @@ pub fn at(model: &Model, trace: &[f64]) -> Layer {
     at_approach(model, &model.compression(trace), &surface_slopes(model))
 }
 
-/// Return the layer states at the approach s of rigid surfaces, n, whose springs have the stiffness `slope`, n: those with c + p/slope = s.
+/// Return the layer states at the approach s of rigid surfaces, n, whose springs have the stiffness `slope`, n: those
+/// with c + p/slope = s.
 fn at_approach(model: &Model, approach: &[f64], slope: &[f64]) -> Layer {
     Layer::resolve(model, approach, &vec![0.0; approach.len()], slope, &[])
 }
@@ -132,7 +138,8 @@ impl Rigid<'_> {
         stiffness.factor().solve(load)
     }
 
-    /// Whether a motion gains work, while neither the ground nor a contact that closes, nor a bond that changes, resists it.
+    /// Whether a motion gains work, while neither the ground nor a contact that closes, nor a bond that changes,
+    /// resists it.
     fn falls_for_ever(&self, motion: &DVector<f64>) -> bool {
         let closing = self.motions.closing(motion);
         let (gain, resisted) = (motion.dot(&self.work), motion.dot(&self.ground.multiply(motion)));

@@ -1,19 +1,21 @@
 //! How far a step of Newton's method goes, and on which lines the laws are resolved.
 //!
-//! States (c, p) in equilibrium are an affine set, so that those on the way of a step need no solve. A state is off its states (c_q, p_q) on the
-//! laws by e = p - p_q = -rho (c - c_q). The step goes to a state c' on the tangents, so that with s = c' - c_q it begins with
+//! States (c, p) in equilibrium are an affine set, so that those on the way of a step need no solve. A state is off its
+//! states (c_q, p_q) on the laws by e = p - p_q = -rho (c - c_q). The step goes to a state c' on the tangents, so that
+//! with s = c' - c_q it begins with
 //!
 //! ```text
 //! dc = s + e/rho,   dp = kappa s - e,   dp_q = kappa/(1 + kappa/rho) (dc + dp/rho) = kappa s,   de = dp - dp_q = -e
 //! ```
 //!
-//! and sum omega e^2/rho falls, with any weights and any rho, until a law turns a corner. Where the whole step is no nearer to the laws, a shorter
-//! one is. Smoothed laws have no corner.
+//! and sum omega e^2/rho falls, with any weights and any rho, until a law turns a corner. Where the whole step is no
+//! nearer to the laws, a shorter one is. Smoothed laws have no corner.
 //!
-//! Any slope leads to the same solution. The bodies answer with dp = -S dc between states in equilibrium: the longest waves as stiffly as in the last
-//! step, where sum omega dp^2/rho = sum omega dc^2 rho over a pair, the shortest like single nodes. The laws themselves are best resolved with the slopes of the last step. Where
-//! they are smoothed, many points move at once, some of which are hardly pressed and some nearly fixed. There the slope is the geometric mean of
-//! three stiffnesses: of single nodes, of the bodies in the last step, and of the layer of the point itself.
+//! Any slope leads to the same solution. The bodies answer with dp = -S dc between states in equilibrium: the longest
+//! waves as stiffly as in the last step, where sum omega dp^2/rho = sum omega dc^2 rho over a pair, the shortest like
+//! single nodes. The laws themselves are best resolved with the slopes of the last step. Where they are smoothed, many
+//! points move at once, some of which are hardly pressed and some nearly fixed. There the slope is the geometric mean
+//! of three stiffnesses: of single nodes, of the bodies in the last step, and of the layer of the point itself.
 
 use crate::model::Model;
 use crate::model::layer::{Layer, meeting_slopes};
@@ -26,17 +28,19 @@ pub(super) struct Progress {
     unit: Vec<f64>,
     /// Pressures in equilibrium with the iterate, n; empty before the first.
     pressure: Vec<f64>,
-    /// Slopes for each pair after the last step, as multiples of [`meeting_slopes`](crate::model::layer::meeting_slopes); empty before the second.
+    /// Slopes for each pair after the last step, as multiples of
+    /// [`meeting_slopes`](crate::model::layer::meeting_slopes); empty before the second.
     answer: Vec<f64>,
     /// The way out of slow convergence.
     pub path: Path,
 }
 
-/// How often a step is halved: to less than a hundredth. From 3 to 14 times 4000 random scenes took the same number of steps within a per cent.
+/// How often a step is halved: to less than a hundredth. From 3 to 14 times 4000 random scenes took the same number of
+/// steps within a per cent.
 const HALVINGS: i32 = 7;
 
-/// Share of a step's length by which the squared distance from the laws must fall (Armijo's rule with its usual constant). Of 540 random scenes all had
-/// the same histories as with zero.
+/// Share of a step's length by which the squared distance from the laws must fall (Armijo's rule with its usual
+/// constant). Of 540 random scenes all had the same histories as with zero.
 const ARMIJO: f64 = 1e-4;
 
 /// The part of a linear step that is taken.
@@ -44,7 +48,8 @@ const ARMIJO: f64 = 1e-4;
 pub(super) struct StepLength {
     /// 1 for a whole step.
     pub length: f64,
-    /// Ratio of the squared distance from the laws at its end to that at its beginning; 1 where there is none to compare with.
+    /// Ratio of the squared distance from the laws at its end to that at its beginning; 1 where there is none to
+    /// compare with.
     pub fall: f64,
     /// Whether no part of the step comes nearer to the laws, so that the least one is taken.
     pub is_lost: bool,
@@ -80,8 +85,8 @@ impl Progress {
         slopes
     }
 
-    /// Keep how the bodies answered a step that changed compressions and pressures by dc and dp, n each, of equilibrium. Points whose dc may be the
-    /// `roundoff` of c, n, show nothing.
+    /// Keep how the bodies answered a step that changed compressions and pressures by dc and dp, n each, of
+    /// equilibrium. Points whose dc may be the `roundoff` of c, n, show nothing.
     fn observe(&mut self, model: &Model, dc: &[f64], dp: &[f64], roundoff: &[f64]) {
         let unit = &self.unit;
         self.answer.resize(model.pairs.len(), 1.0);
@@ -99,8 +104,9 @@ impl Progress {
         }
     }
 
-    /// Return the length of a step from the compressions `from`, known to their `roundoff`, to the compressions c and the pressures p, n each: the part of the way
-    /// that comes nearer to the laws with the smoothing of `states`, from which the step is taken.
+    /// Return the length of a step from the compressions `from`, known to their `roundoff`, to the compressions c and
+    /// the pressures p, n each: the part of the way that comes nearer to the laws with the smoothing of `states`, from
+    /// which the step is taken.
     pub fn step_length(
         &mut self,
         model: &Model,
@@ -141,7 +147,8 @@ impl Progress {
     }
 }
 
-/// Return the geometric mean of stiffnesses of the bodies, of a node and of a smoothed layer, as far as there are such: a layer at an infinite gap has none.
+/// Return the geometric mean of stiffnesses of the bodies, of a node and of a smoothed layer, as far as there are such:
+/// a layer at an infinite gap has none.
 fn mean(bodies: f64, node: f64, layer: f64) -> f64 {
     let both = (bodies * node).sqrt();
     if layer > 0.0 { both.powf(2.0 / 3.0) * layer.cbrt() } else { both }
@@ -151,23 +158,26 @@ fn between(from: &[f64], to: &[f64], t: f64) -> Vec<f64> {
     from.iter().zip(to).map(|(from, to)| from + t * (to - from)).collect()
 }
 
-/// Steps of the laws themselves that are not taken whole before the laws are smoothed. With one, 58 slender scenes took 335 steps, with two 321.
+/// Steps of the laws themselves that are not taken whole before the laws are smoothed. With one, 58 slender scenes took
+/// 335 steps, with two 321.
 const SHORTENED: usize = 2;
 
-/// Ratio of mu at the beginning to the mean squared distance D of the states, and of D to mu where the path is lost. D counts the mismatch of
-/// few points, while the contact is far from its final place. With ratios from 30 to 300, peeling beams with linear layers took the same number of steps within one; with 1 they took nine
-/// times as many. Without the way back a block that leans on its edge runs in a cycle of whole steps, with D from 20 to 3e5 mu.
+/// Ratio of mu at the beginning to the mean squared distance D of the states, and of D to mu where the path is lost. D
+/// counts the mismatch of few points, while the contact is far from its final place. With ratios from 30 to 300,
+/// peeling beams with linear layers took the same number of steps within one; with 1 they took nine times as many.
+/// Without the way back a block that leans on its edge runs in a cycle of whole steps, with D from 20 to 3e5 mu.
 const AHEAD: f64 = 100.0;
 
 /// The state of a run's paths.
 ///
-/// They are the remedy for slow convergence. Where slender bodies peel off each other, the contact moves by about one point a step, however Newton's method begins. Laws smoothed by an
-/// energy per area mu ([`resolve`](crate::contact::law::resolve)) have no corner, so that many points move at once. In equilibrium with smoothed
-/// laws, the duality gap is at most mu times the area. As mu falls, the states follow the central path of interior-point methods to the laws
-/// themselves.
+/// They are the remedy for slow convergence. Where slender bodies peel off each other, the contact moves by about one
+/// point a step, however Newton's method begins. Laws smoothed by an energy per area mu
+/// ([`resolve`](crate::contact::law::resolve)) have no corner, so that many points move at once. In equilibrium with
+/// smoothed laws, the duality gap is at most mu times the area. As mu falls, the states follow the central path of
+/// interior-point methods to the laws themselves.
 ///
-/// mu is measured by the squared distance e^2/rho of states in equilibrium from the laws, which is an energy per area, too. D, its mean over all
-/// points, shows how far Newton's method has come.
+/// mu is measured by the squared distance e^2/rho of states in equilibrium from the laws, which is an energy per area,
+/// too. D, its mean over all points, shows how far Newton's method has come.
 ///
 /// ```text
 /// enter    at the second step with the laws themselves that is not taken whole:  mu = 100 D
@@ -197,8 +207,8 @@ pub(super) struct Equilibrium<'a> {
 }
 
 impl Equilibrium<'_> {
-    /// Return sum omega e^2/rho with e = p - p_q: the squared distance from the laws with this smoothing. Components of e below the roundoff level
-    /// are ignored, so that states that differ by roundoff have the same distance.
+    /// Return sum omega e^2/rho with e = p - p_q: the squared distance from the laws with this smoothing. Components of
+    /// e below the roundoff level are ignored, so that states that differ by roundoff have the same distance.
     pub fn distance(&self, model: &Model, smoothing: &[f64]) -> f64 {
         let Self { compression, roundoff, pressure, rho } = *self;
         let resolved = Layer::resolve(model, compression, pressure, rho, smoothing);
@@ -218,8 +228,8 @@ impl Path {
         self.shortened += usize::from(length < 1.0 && !is_smoothed);
     }
 
-    /// Return mu of the next step at each point, n, after a step to `state` with `smoothing`; empty for the laws themselves. Smoothing below the energy
-    /// `unseen` does not change the result any more.
+    /// Return mu of the next step at each point, n, after a step to `state` with `smoothing`; empty for the laws
+    /// themselves. Smoothing below the energy `unseen` does not change the result any more.
     pub fn smoothing(&mut self, model: &Model, state: &Equilibrium, smoothing: &[f64], unseen: f64) -> Vec<f64> {
         let enters = smoothing.is_empty();
         if enters && self.shortened < SHORTENED {
@@ -243,8 +253,8 @@ mod tests {
     use super::*;
     use crate::model::sample::two_pairs;
 
-    /// Points with p = 4 c and p = c^2, n = 4: a step to the laws goes all the way, one that goes far beyond a part of it, one away from the laws
-    /// none of it.
+    /// Points with p = 4 c and p = c^2, n = 4: a step to the laws goes all the way, one that goes far beyond a part of
+    /// it, one away from the laws none of it.
     #[test]
     fn a_step_goes_as_far_as_it_comes_nearer() {
         let model = two_pairs();
@@ -274,8 +284,8 @@ mod tests {
         assert_eq!(away, None);
     }
 
-    /// What a pair's points answered together, beside their own stiffness; nothing counts as a millionth. With smoothed laws, the geometric mean of both
-    /// and the stiffness of the layer, where it has one.
+    /// What a pair's points answered together, beside their own stiffness; nothing counts as a millionth. With smoothed
+    /// laws, the geometric mean of both and the stiffness of the layer, where it has one.
     #[test]
     fn lines_are_as_steep_as_the_bodies_answer() {
         let (model, unit) = (two_pairs(), [2.0, 8.0, 1.0, 1.0]);
@@ -296,8 +306,9 @@ mod tests {
         }
     }
 
-    /// Points with p = 4 c and p = c^2, n = 4: the path begins at the second shortened step with 100 times the mean distance, falls with it,
-    /// rises where the distance is more than 100 times as large, and ends where nobody sees it.
+    /// Points with p = 4 c and p = c^2, n = 4: the path begins at the second shortened step with 100 times the mean
+    /// distance, falls with it, rises where the distance is more than 100 times as large, and ends where nobody sees
+    /// it.
     #[test]
     fn smoothing_follows_the_distance() {
         let model = two_pairs();

@@ -39,7 +39,8 @@ pub enum Status {
     InnerSolver(Failure),
     /// The run ended as solved, but the forces f - K u - B' omega p, computed with K itself, have this relative error.
     Unbalanced(f64),
-    /// The run ended as solved, but roundoff of gaps and displacements may change the pressures by this share, so that no digit of them is left.
+    /// The run ended as solved, but roundoff of gaps and displacements may change the pressures by this share, so that
+    /// no digit of them is left.
     NoDigits(f64),
     /// A signal ended the run.
     Interrupted {
@@ -60,22 +61,24 @@ impl Status {
     }
 }
 
-/// Return the paper's rho: the norm of the increment of normal displacements over the norm of the displacements. Zero over zero is zero.
+/// Return the paper's rho: the norm of the increment of normal displacements over the norm of the displacements. Zero
+/// over zero is zero.
 pub fn relative_increment(step: &[f64], now: &[f64]) -> f64 {
     let norm = |v: &[f64]| crate::linalg::dot(v, v).sqrt();
     if norm(step) == 0.0 { 0.0 } else { norm(step) / norm(now) }
 }
 
-/// Share to which a step must reduce the error, or the squared distance from the laws, to be progress: it takes off a tenth.
+/// Share to which a step must reduce the error, or the squared distance from the laws, to be progress: it takes off a
+/// tenth.
 const FALLS: f64 = 0.9;
 
-/// Steps without progress after which Newton's method stagnates. One happens at the corner of a law; of 540 random scenes none that went on after three
-/// was solved.
+/// Steps without progress after which Newton's method stagnates. One happens at the corner of a law; of 540 random
+/// scenes none that went on after three was solved.
 const PATIENCE: usize = 3;
 
-/// Share to which the error must fall near the solution, where a fall by a tenth is often the luck of roundoff. Linear systems are solved to a half or better
-/// ([`LinearStep::roughest`](crate::model::linear::LinearStep::roughest)), so that a step of Newton's method halves the error there.
-/// None of 300 random scenes was lost by it.
+/// Share to which the error must fall near the solution, where a fall by a tenth is often the luck of roundoff. Linear
+/// systems are solved to a half or better ([`LinearStep::roughest`](crate::model::linear::LinearStep::roughest)), so
+/// that a step of Newton's method halves the error there. None of 300 random scenes was lost by it.
 const NEAR_FALLS: f64 = 0.5;
 
 /// Share of F1 by which a fall is more than its roundoff: that of a sum of a million terms is 1e3 epsilon.
@@ -93,10 +96,11 @@ pub(super) fn roundoff(f1: f64) -> f64 {
 
 /// A watch for stagnation of Newton's method.
 ///
-/// Each step is measured by itself, by the squared distance from the laws at its end over that at its beginning: earlier steps had other slopes. Far from
-/// the solution this distance falls while the error may rise by many orders. Where a contact peels point by point, F1 alone falls ([`falls`]), and what
-/// reaches a new least F1 cannot repeat itself. Where the square of the error, in the energy norm, is below [`EXACT`], the solution is near: a distance
-/// that falls is roundoff there.
+/// Each step is measured by itself, by the squared distance from the laws at its end over that at its beginning:
+/// earlier steps had other slopes. Far from the solution this distance falls while the error may rise by many orders.
+/// Where a contact peels point by point, F1 alone falls ([`falls`]), and what reaches a new least F1 cannot repeat
+/// itself. Where the square of the error, in the energy norm, is below [`EXACT`], the solution is near: a distance that
+/// falls is roundoff there.
 #[derive(Debug, Clone)]
 pub(super) struct Stagnation {
     /// The error at the last progress in it.
@@ -114,8 +118,9 @@ impl Default for Stagnation {
 }
 
 impl Stagnation {
-    /// Note a step: the error and F1 after it, the squared distance from the laws after it over that before it (`fall`), and whether the laws were smoothed, so
-    /// that far from the solution the error falls with mu. Return whether the run stagnates.
+    /// Note a step: the error and F1 after it, the squared distance from the laws after it over that before it
+    /// (`fall`), and whether the laws were smoothed, so that far from the solution the error falls with mu. Return
+    /// whether the run stagnates.
     pub fn note(&mut self, error: f64, energy: f64, fall: f64, is_smoothed: bool) -> bool {
         let is_far = error.powi(2) > EXACT;
         let share = if is_far { FALLS } else { NEAR_FALLS };

@@ -1,4 +1,5 @@
-//! The displacement of a body towards its contact, as a row of weights of nodal displacements for each of its contact surfaces.
+//! The displacement of a body towards its contact, as a row of weights of nodal displacements for each of its contact
+//! surfaces.
 
 use super::bodies::SceneBody;
 use super::groups::Line;
@@ -12,14 +13,14 @@ use crate::model::Segment;
 use crate::problem::SpringKind;
 use std::cell::OnceCell;
 
-/// Smallest cosine of the angle between a force or a constrained direction and the contact normal at which a place is included.
-/// It belongs to 60 degrees, up to which facets are pairs without the key `angle`.
+/// Smallest cosine of the angle between a force or a constrained direction and the contact normal at which a place is
+/// included. It belongs to 60 degrees, up to which facets are pairs without the key `angle`.
 const ALONG: f64 = 0.5;
 
 /// Least length of the integrated normal of a pair relative to its area: below this ratio the pair has no mean normal.
 ///
-/// Around a closed surface the integral is zero except for facets without a partner, and one such facet in a thousand does not
-/// define a direction of the contact. Half a circle has the ratio 0.64.
+/// Around a closed surface the integral is zero except for facets without a partner, and one such facet in a thousand
+/// does not define a direction of the contact. Half a circle has the ratio 0.64.
 const CANCELS: f64 = 1e-3;
 
 /// Return the mean unit normal of a pair from side a to side b, if it has one.
@@ -30,12 +31,13 @@ pub fn mean_normal(pair: &ContactPair) -> Option<[f64; 3]> {
     (size > CANCELS * total).then(|| sum.map(|n| n / size))
 }
 
-/// Return a row for each contact surface of a body, with displacements of nodes as columns: how far the body moves along the mean outer
-/// normal of the pair. The sum over both bodies is the approach of the pair. Rows of pairs without a mean normal are empty.
+/// Return a row for each contact surface of a body, with displacements of nodes as columns: how far the body moves
+/// along the mean outer normal of the pair. The sum over both bodies is the approach of the pair. Rows of pairs without
+/// a mean normal are empty.
 ///
-/// A body moves as the supports do that move it along the normal. Without such, the displacement is the one on which the forces along the
-/// normal of its loads work, divided by their sum. A body without such loads moves as its supports and springs along the normal, and else
-/// as the mean over all of it.
+/// A body moves as the supports do that move it along the normal. Without such, the displacement is the one on which
+/// the forces along the normal of its loads work, divided by their sum. A body without such loads moves as its supports
+/// and springs along the normal, and else as the mean over all of it.
 ///
 /// # Errors
 /// A group is missing, or a load is not finite.
@@ -73,7 +75,8 @@ pub fn rows<const D: usize>(
 
 /// A support or spring of the body.
 struct Holder<const D: usize> {
-    /// Unit vectors: the constrained directions, and whether the body moves along them by a displacement other than zero.
+    /// Unit vectors: the constrained directions, and whether the body moves along them by a displacement other than
+    /// zero.
     directions: Vec<([f64; D], bool)>,
     /// Integrals of the shape functions of nodes over its surface; 1 for each node of a group of another dimension.
     weights: Vec<(u32, f64)>,
@@ -109,13 +112,14 @@ fn holder<const D: usize>(body: &SceneBody<D>, group: &Group, directions: Vec<([
     Holder { directions, weights: areas.filter(|_| is_surface).unwrap_or_else(nodes), is_surface }
 }
 
-/// Return the first components of nodal forces. Under a unit traction or body force along x they are the integrals of the shape functions.
+/// Return the first components of nodal forces. Under a unit traction or body force along x they are the integrals of
+/// the shape functions.
 fn shapes<const D: usize>(all: &NodalForces<D>) -> Vec<(u32, f64)> {
     all.iter().map(|(node, weight)| (node, weight[0])).collect()
 }
 
-/// Return the weights of the mean over those holders that constrain the direction `n`, or move the body along it if `moving`. Points count
-/// only where there is no surface. The result is `None` without such holders.
+/// Return the weights of the mean over those holders that constrain the direction `n`, or move the body along it if
+/// `moving`. Points count only where there is no surface. The result is `None` without such holders.
 fn mean<const D: usize>(holders: &[Holder<D>], n: [f64; D], moving: bool) -> Option<Vec<(u32, f64)>> {
     let acts = |&(d, moves): &([f64; D], bool)| (moves || !moving) && dot(&d, &n).abs() >= ALONG;
     let along = holders.iter().filter(|holder| holder.directions.iter().any(acts));
@@ -127,8 +131,8 @@ fn mean<const D: usize>(holders: &[Holder<D>], n: [f64; D], moving: bool) -> Opt
     (!weights.is_empty()).then(|| summed(weights))
 }
 
-/// Return the forces at nodes along `n` of those loads that push along it; `None` without such loads. A moment and a pressure all around
-/// have no sum.
+/// Return the forces at nodes along `n` of those loads that push along it; `None` without such loads. A moment and a
+/// pressure all around have no sum.
 fn working<const D: usize>(loads: &[NodalForces<D>], n: [f64; D]) -> Option<Vec<(u32, f64)>> {
     let mut weights = Vec::new();
     for load in loads {

@@ -103,7 +103,8 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
         Ok(())
     }
 
-    /// Assemble the matrix of a body, all of it or the rows of this rank, and make its solver, which takes the contact rows.
+    /// Assemble the matrix of a body, all of it or the rows of this rank, and make its solver, which takes the contact
+    /// rows.
     fn assemble(&mut self, part: &mut SceneBody<D>, load: Vec<f64>, slot: &mut BodySlot) -> Result<()> {
         let prescribed = part.mesh.prescribed.clone();
         let modes = part.mesh.unconstrained_modes.iter();
@@ -127,8 +128,8 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
             Some(owned) => owned.interpolation::<D>(|coarse| mesh.interpolation(coarse)),
             None => mesh.interpolation(&mesh.coarse_nodes()),
         });
-        // Multigrid must represent motions with hardly any strain. Far from the axis, a ring is nearly as soft against radial
-        // displacements and rotations of its section as a plane body.
+        // Multigrid must represent motions with hardly any strain. Far from the axis, a ring is nearly as soft against
+        // radial displacements and rotations of its section as a plane body.
         let near_null_space = || rigid::modes(&mesh.extent).iter().map(|motion| mesh.dofs_of(motion)).collect();
         let body = self.factory.make(Assembled {
             name: slot.name.clone(),
@@ -164,8 +165,8 @@ pub trait Factory {
     /// bodies are those of the problem before. Collective.
     fn settle(&mut self, is_renewed: bool);
 
-    /// Return the sets of bodies whose nodes the plan distributes over the ranks. Bodies of one set share a matrix; their indices
-    /// are in increasing order. Bodies that stay whole are in no set.
+    /// Return the sets of bodies whose nodes the plan distributes over the ranks. Bodies of one set share a matrix;
+    /// their indices are in increasing order. Bodies that stay whole are in no set.
     fn distributed(&self) -> Vec<Vec<usize>>;
 
     /// Return whether the plan needs the interpolation of a body from linear displacements.
@@ -190,12 +191,12 @@ pub struct Assembled<'a> {
     pub distribution: Option<Distribution>,
     /// All contact rows of the body, pair by pair. The columns are its dofs, or those of the nodes that this rank has.
     pub rows: Csr,
-    /// Motions with hardly any strain in a few cells, for the near-null space of multigrid. They are the rigid motions of the
-    /// free body, in a body of revolution those of its meridian. Each is one vector over these dofs.
+    /// Motions with hardly any strain in a few cells, for the near-null space of multigrid. They are the rigid motions
+    /// of the free body, in a body of revolution those of its meridian. Each is one vector over these dofs.
     pub near_null_space: &'a dyn Fn() -> Vec<Vec<f64>>,
     /// Displacements of the rigid motions that supports and springs leave, on these dofs.
     pub unconstrained_modes: Vec<Vec<f64>>,
-    /// Interpolation of displacements from linear ones, if it was requested. The rows are the dofs of `body`. The columns belong
-    /// to this body alone, or to all bodies of the matrix if the dofs are distributed.
+    /// Interpolation of displacements from linear ones, if it was requested. The rows are the dofs of `body`. The
+    /// columns belong to this body alone, or to all bodies of the matrix if the dofs are distributed.
     pub interpolation: Option<Prolongation>,
 }

@@ -23,11 +23,11 @@ pub struct SurfacePair<'a, const D: usize> {
     pub swapped: bool,
 }
 
-/// Return the pairs of bodies that come near each other. Pairs in `named` are excluded; they are indices of bodies, the smaller
-/// one first. The last rule for two bodies decides alone whether they are a pair.
+/// Return the pairs of bodies that come near each other. Pairs in `named` are excluded; they are indices of bodies, the
+/// smaller one first. The last rule for two bodies decides alone whether they are a pair.
 ///
-/// All facets that could have a partner are collected first, so that the nodal normals are those of smooth surfaces. Then only
-/// the facets with a common piece are kept.
+/// All facets that could have a partner are collected first, so that the nodal normals are those of smooth surfaces.
+/// Then only the facets with a common piece are kept.
 ///
 /// # Errors
 /// A pattern matches no body.
@@ -47,7 +47,8 @@ pub fn find<'a, const D: usize>(
     Ok(all)
 }
 
-/// Return the pairs of bodies to which a rule applies, the body with the smaller index first, with the facets that could have a partner.
+/// Return the pairs of bodies to which a rule applies, the body with the smaller index first, with the facets that
+/// could have a partner.
 fn possible<'a, const D: usize>(
     rules: &[&'a ContactSpec],
     parts: &[SceneBody<D>],

@@ -38,13 +38,15 @@ impl<'a, const D: usize> SceneBody<'a, D> {
         Side::new(name, &self.mesh.space, facets, &self.mesh.held.prescribed, &self.mesh.held.frame, edge)
     }
 
-    /// Return a cell with the elasticity at each of these facets: the one that the facet bounds, if the elasticity differs between cells.
+    /// Return a cell with the elasticity at each of these facets: the one that the facet bounds, if the elasticity
+    /// differs between cells.
     pub fn cells_at(&self, facets: &Facets<D>) -> Vec<usize> {
         if self.elasticity.is_constant() { vec![0; facets.count()] } else { self.mesh.space.cells_at(facets) }
     }
 
-    /// Return the area (volume) of the body, in a body of revolution the volume of the rings, and the means of the moduli along x, y, z
-    /// ([`Elasticity::moduli`]). A cell whose constants make no material at its middle contributes zero; assembly refuses it.
+    /// Return the area (volume) of the body, in a body of revolution the volume of the rings, and the means of the
+    /// moduli along x, y, z ([`Elasticity::moduli`]). A cell whose constants make no material at its middle contributes
+    /// zero; assembly refuses it.
     pub fn volume_and_moduli(&self) -> (f64, [f64; 3]) {
         let (space, elasticity) = (&self.mesh.space, &self.elasticity);
         let cells = || 0..space.cell_count();
@@ -122,7 +124,8 @@ impl<'a, const D: usize> SceneBody<'a, D> {
         Ok(nodes.into_iter().map(|node| (node, each)).collect())
     }
 
-    /// Return the nodal forces of a load of the scene without its factor. A force on a rigid surface is spread over its area.
+    /// Return the nodal forces of a load of the scene without its factor. A force on a rigid surface is spread over its
+    /// area.
     ///
     /// # Errors
     /// See [`SceneBody::load`].
@@ -136,8 +139,8 @@ impl<'a, const D: usize> SceneBody<'a, D> {
         }
     }
 
-    /// Return a warning if the largest Poisson's ratio is so large that linear elements are too stiff, except in plane stress. There the
-    /// volume can hardly change.
+    /// Return a warning if the largest Poisson's ratio is so large that linear elements are too stiff, except in plane
+    /// stress. There the volume can hardly change.
     pub fn locking(&self, plane: Plane) -> Option<String> {
         if self.spec.order > Order::P1 || (D == 2 && plane == Plane::Stress) {
             return None;
@@ -211,8 +214,8 @@ fn too_large(spec: &BodySpec) -> Error {
         .label("their forces are beyond the range of numbers")
 }
 
-/// Return the bodies with their spaces, elasticity, supports and springs. `spaces` are those of an earlier problem on the
-/// mesh; there are none before the first.
+/// Return the bodies with their spaces, elasticity, supports and springs. `spaces` are those of an earlier problem on
+/// the mesh; there are none before the first.
 ///
 /// # Errors
 /// The scene contradicts its mesh.
@@ -320,8 +323,8 @@ fn elasticity<const D: usize>(spec: &BodySpec, space: &Space<D>, mesh: &Mesh<D>,
     elasticity_of(spec, of_cell, D, plane)
 }
 
-/// Return the elasticity of some cells of a body. `of_cell` is the index of the constants of each cell; it is empty if the body
-/// has no regions.
+/// Return the elasticity of some cells of a body. `of_cell` is the index of the constants of each cell; it is empty if
+/// the body has no regions.
 ///
 /// # Errors
 /// Constants make no material.
@@ -336,8 +339,8 @@ fn constants(spec: &BodySpec) -> impl Iterator<Item = ElasticitySpec> {
     std::iter::once(spec.elasticity()).chain(spec.regions.iter().map(|region| region.elasticity()))
 }
 
-/// Return the error of the constants of a body (`number` 0) or of one of its regions. The point is given if the constants depend
-/// on it.
+/// Return the error of the constants of a body (`number` 0) or of one of its regions. The point is given if the
+/// constants depend on it.
 fn refusal(spec: &BodySpec, number: usize, x: Option<[f64; 3]>, flaw: &Flaw) -> Error {
     let elasticity = constants(spec).nth(number).unwrap_or_else(|| spec.elasticity());
     let place = &elasticity.place;

@@ -1,5 +1,5 @@
-//! The mesh of a body with all that is tied to its nodes: on the first rank the whole body, on every rank the part that it needs, with local
-//! numbers.
+//! The mesh of a body with all that is tied to its nodes: on the first rank the whole body, on every rank the part that
+//! it needs, with local numbers.
 
 use super::owned::OwnedDofs;
 use super::supports::Constraints;
@@ -32,9 +32,11 @@ pub struct BodyMesh<const D: usize> {
     pub rows: Csr,
     /// The same rows with displacements of nodes as columns.
     pub nodal_rows: Csr,
-    /// The displacement towards each contact surface, with displacements of nodes as columns ([`approach::rows`](super::approach::rows)).
+    /// The displacement towards each contact surface, with displacements of nodes as columns
+    /// ([`approach::rows`](super::approach::rows)).
     pub approach: Csr,
-    /// Nodal forces of the loads without those on rigid surfaces. On a part they are those at owned nodes, and at nodes tied to these.
+    /// Nodal forces of the loads without those on rigid surfaces. On a part they are those at owned nodes, and at nodes
+    /// tied to these.
     pub load: NodalForces<D>,
     /// Rigid motions that supports and springs leave.
     pub unconstrained_modes: Vec<RigidMotion<D>>,
@@ -88,7 +90,8 @@ impl<const D: usize> BodyMesh<D> {
         self.held.frame.dof(dof, |node| self.at(motion, node))
     }
 
-    /// Return the products of the rigid motions that supports and springs leave, over all dofs without the prescribed ones.
+    /// Return the products of the rigid motions that supports and springs leave, over all dofs without the prescribed
+    /// ones.
     pub fn products(&self) -> DMatrix<f64> {
         let (count, mut held) =
             (self.unconstrained_modes.len(), self.prescribed.iter().map(|entry| entry.0).peekable());
@@ -118,8 +121,8 @@ impl<const D: usize> BodyMesh<D> {
         all
     }
 
-    /// Return the combination of the `rigid_modes` that comes nearest to the prescribed displacements in the sum of squares. Its part along motions that
-    /// supports leave is zero.
+    /// Return the combination of the `rigid_modes` that comes nearest to the prescribed displacements in the sum of
+    /// squares. Its part along motions that supports leave is zero.
     pub fn imposed_motion(&self, rigid_modes: &[RigidMotion<D>]) -> RigidMotion<D> {
         let mut squares = DMatrix::zeros(rigid_modes.len(), rigid_modes.len());
         let mut work = DVector::zeros(rigid_modes.len());

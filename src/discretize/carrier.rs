@@ -5,14 +5,15 @@ use crate::fem::{Facets, area_vector, length};
 use crate::problem::contact::Carrier;
 use crate::problem::order::Order;
 
-/// Ratio of two moduli up to which bodies are equally stiff. One steel is given as 2.1e5 or 2.08e5, and such a difference must not outweigh
-/// the meshes.
+/// Ratio of two moduli up to which bodies are equally stiff. One steel is given as 2.1e5 or 2.08e5, and such a
+/// difference must not outweigh the meshes.
 const EQUAL: f64 = 1.01;
 
-/// Ratio of the sizes of facets above which the finer of two surfaces carries the contact points, since errors are those of a mesh of its size: on rings
-/// whose facets are as 3 to 4, the error of the pressure is 0.011 if the finer side carries and 0.034 if the coarser one does
-/// (`rings_of_quadrangles_have_lames_pressure`). A mesher divides a length L into L/h facets, rounded to an integer, which changes their size by at
-/// most half of 1/N for N facets: two surfaces of ten facets or more of one nominal size stay below the ratio.
+/// Ratio of the sizes of facets above which the finer of two surfaces carries the contact points, since errors are
+/// those of a mesh of its size: on rings whose facets are as 3 to 4, the error of the pressure is 0.011 if the finer
+/// side carries and 0.034 if the coarser one does (`rings_of_quadrangles_have_lames_pressure`). A mesher divides a
+/// length L into L/h facets, rounded to an integer, which changes their size by at most half of 1/N for N facets: two
+/// surfaces of ten facets or more of one nominal size stay below the ratio.
 const FINER: f64 = 1.1;
 
 /// What decides whether a surface carries the contact points.
@@ -40,11 +41,12 @@ impl Candidate {
     }
 }
 
-/// Return whether the second of two surfaces carries the contact points: the one of the softer body, else the finer one, else the first.
+/// Return whether the second of two surfaces carries the contact points: the one of the softer body, else the finer
+/// one, else the first.
 ///
-/// The mesh of the softer body follows the pressures. A stiff body has no error that would refine its mesh: if a cylinder of modulus 10 is
-/// pressed into a block of 2e5 to an error of 1e-2, the mesh has 8 200 cells with the points on the cylinder. It has more than 150 000 with the
-/// points on the block, and eleven of these under pressure.
+/// The mesh of the softer body follows the pressures. A stiff body has no error that would refine its mesh: if a
+/// cylinder of modulus 10 is pressed into a block of 2e5 to an error of 1e-2, the mesh has 8 200 cells with the points
+/// on the cylinder. It has more than 150 000 with the points on the block, and eleven of these under pressure.
 fn prefers_second([first, second]: [Candidate; 2]) -> bool {
     if first.young > EQUAL * second.young || second.young > EQUAL * first.young {
         return second.young < first.young;
@@ -52,8 +54,8 @@ fn prefers_second([first, second]: [Candidate; 2]) -> bool {
     FINER * second.size < first.size
 }
 
-/// Return whether the second of two surfaces of these bodies carries the contact points. `table` is the number of their table in the scene, and
-/// `decided` has the choices that an earlier mesh of the same scene made.
+/// Return whether the second of two surfaces of these bodies carries the contact points. `table` is the number of their
+/// table in the scene, and `decided` has the choices that an earlier mesh of the same scene made.
 pub fn is_second<const D: usize>(
     parts: &[SceneBody<D>],
     bodies: [usize; 2],

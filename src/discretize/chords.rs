@@ -10,9 +10,11 @@ use crate::problem::order::Order;
 use std::collections::HashMap;
 use std::f64::consts::FRAC_PI_3;
 
-/// Return the share that chords may take from the balance of all loads on surfaces, zero if these are plane with straight edges.
+/// Return the share that chords may take from the balance of all loads on surfaces, zero if these are plane with
+/// straight edges.
 ///
-/// A chord is shorter by t^2/24 than the arc on which it turns by the angle t. Facets of quadratic elements follow an arc.
+/// A chord is shorter by t^2/24 than the arc on which it turns by the angle t. Facets of quadratic elements follow an
+/// arc.
 ///
 /// # Errors
 /// A load on a surface that the mesh does not have.
@@ -29,8 +31,9 @@ pub fn lack<const D: usize>(parts: &[SceneBody<D>], mesh: &Mesh<D>) -> Result<f6
     Ok(largest * largest / 24.0)
 }
 
-/// Return the angles between neighbouring facets of a surface, and in space between neighbouring edges at its ends, without those of edges and
-/// corners of the part. The facets of a circle of six chords turn by the least angle of these; Gmsh divides a circle into seven or more.
+/// Return the angles between neighbouring facets of a surface, and in space between neighbouring edges at its ends,
+/// without those of edges and corners of the part. The facets of a circle of six chords turn by the least angle of
+/// these; Gmsh divides a circle into seven or more.
 fn turns<const D: usize>(space: &Space<D>, facets: &Facets<D>) -> impl Iterator<Item = f64> {
     let normals = facets.normals(space);
     let at = |node: u32| space.nodes[node as usize];

@@ -60,8 +60,8 @@ impl BodyInfo {
 }
 
 impl<const D: usize> WholeBody<'_, D> {
-    /// Return what all ranks have of the body: the arrays of the model and the facts for reports. `checked` is the result of the check of its
-    /// mesh.
+    /// Return what all ranks have of the body: the arrays of the model and the facts for reports. `checked` is the
+    /// result of the check of its mesh.
     pub fn shared(&self, pairs: &[ContactPair], checked: &BodyCheck, plane: Plane) -> (BodySlot, BodyInfo) {
         let of_body = || self.segments.iter().map(|segment| &pairs[segment.pair]);
         let surface: f64 = of_body().map(|pair| pair.area.iter().sum::<f64>()).sum();

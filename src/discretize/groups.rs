@@ -1,4 +1,5 @@
-//! The groups of the mesh on which the lines of a body's table act, and the values of fields there. Errors point into the scene.
+//! The groups of the mesh on which the lines of a body's table act, and the values of fields there. Errors point into
+//! the scene.
 
 use crate::error::{Error, Located, Result, few};
 use crate::expression::Field;
@@ -33,7 +34,8 @@ pub trait Line: Clone {
     }
 }
 
-/// Implement [`Line`] for a type with the field `on`, whose lines are in this field of a body and act on groups of these dimensions.
+/// Implement [`Line`] for a type with the field `on`, whose lines are in this field of a body and act on groups of
+/// these dimensions.
 macro_rules! line {
     ($type:ty, $what:literal, $field:ident, |$line:ident, $dimension:ident| $dimensions:expr) => {
         impl Line for $type {
@@ -72,7 +74,8 @@ line!(Load, "load", load, |load, D| match load.kind {
     _ => const { &[D - 1] },
 });
 
-/// Return the mesh group of this name if its dimension is one of `dimensions`. `what` says in an error what the group is for.
+/// Return the mesh group of this name if its dimension is one of `dimensions`. `what` says in an error what the group
+/// is for.
 ///
 /// # Errors
 /// The mesh has no such group.
@@ -160,7 +163,8 @@ impl<'a> FieldValues<'a> {
     }
 }
 
-/// Return the reason that names the body in an error at an expression. The table of the expression may be for many bodies.
+/// Return the reason that names the body in an error at an expression. The table of the expression may be for many
+/// bodies.
 pub fn of_body(name: &str) -> String {
     format!("it is for body `{name}`")
 }

@@ -1,4 +1,5 @@
-//! The places of a mesh that the page of a run marks: where supports, loads and springs act, and where bodies may touch.
+//! The places of a mesh that the page of a run marks: where supports, loads and springs act, and where bodies may
+//! touch.
 
 use super::groups::Line;
 use crate::contact::ContactPair;
@@ -7,7 +8,8 @@ use crate::output::{Mark, Role};
 use crate::problem::BodySpec;
 use std::collections::BTreeSet;
 
-/// Return the marks of all bodies. Surfaces that are no groups of the mesh are left out: those of obstacles, and of pairs that were found.
+/// Return the marks of all bodies. Surfaces that are no groups of the mesh are left out: those of obstacles, and of
+/// pairs that were found.
 pub fn marks<const D: usize>(mesh: &Mesh<D>, bodies: &[BodySpec], pairs: &[ContactPair]) -> Vec<Mark> {
     let of_body = |(body, spec): (usize, &BodySpec)| -> Vec<(usize, Role, String)> {
         let supports = spec.fix.iter().map(|support| (Role::Support, support.on()));

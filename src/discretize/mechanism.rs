@@ -1,15 +1,15 @@
 //! Rigid motions of bodies, alone or together, that neither supports nor springs nor contact resist.
 //!
-//! A body may slide on a plane, halves of a ring of blocks may slide on each other, and a group of bodies without supports may move as
-//! one. These motions close no point of contact ([`Squares`]), among the motions that supports and springs leave to each body. Motions of a whole group come
-//! first, so that they are found and named as such.
+//! A body may slide on a plane, halves of a ring of blocks may slide on each other, and a group of bodies without
+//! supports may move as one. These motions close no point of contact ([`Squares`]), among the motions that supports and
+//! springs leave to each body. Motions of a whole group come first, so that they are found and named as such.
 //!
-//! Facets resist motions that smooth surfaces do not, such as the turn of a pin in a hub, because their normals lean (docs/theory.md, "Motions that nothing
-//! holds"). Such motions count as free.
+//! Facets resist motions that smooth surfaces do not, such as the turn of a pin in a hub, because their normals lean
+//! (docs/theory.md, "Motions that nothing holds"). Such motions count as free.
 //!
-//! If the loads do no work on a motion, the solution is unique only up to it. One dof is then fixed, without reaction. If the loads do
-//! work on it, there is no solution, and the run reports this. Loads that balance on the true surfaces may lack balance on facets, and by
-//! quadrature. A small imbalance is taken from the loads, with a warning.
+//! If the loads do no work on a motion, the solution is unique only up to it. One dof is then fixed, without reaction.
+//! If the loads do work on it, there is no solution, and the run reports this. Loads that balance on the true surfaces
+//! may lack balance on facets, and by quadrature. A small imbalance is taken from the loads, with a warning.
 
 use super::whole::{NO_WORK, WholeBody};
 use crate::contact::ContactPair;
@@ -22,7 +22,8 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 /// Least value of [`MechanismSearch::lack`]: forces in equilibrium that people write have three digits or more.
 const LACKING: f64 = 1e-3;
 
-/// Find the motions that nothing resists. Fix those on which no load works. `lack` is the share that chords may take from the balance of loads.
+/// Find the motions that nothing resists. Fix those on which no load works. `lack` is the share that chords may take
+/// from the balance of loads.
 ///
 /// Both sides of a pair slide along each other in such a motion: the normals of the pair are turned across it.
 pub fn fix<const D: usize>(bodies: &mut [WholeBody<D>], pairs: &mut [ContactPair], lack: f64) -> Vec<Mechanism> {
@@ -58,7 +59,8 @@ struct MechanismSearch<'p, 's, const D: usize> {
     pairs: &'p mut [ContactPair],
     /// Angle by which errors of coordinates turn normals.
     tilt: f64,
-    /// Largest work of the loads on a motion, as a share of what forces of their sizes could do, that the mesh may be blamed for.
+    /// Largest work of the loads on a motion, as a share of what forces of their sizes could do, that the mesh may be
+    /// blamed for.
     lack: f64,
     found: Vec<Mechanism>,
     /// The motions that contact does not resist and that are fixed.
@@ -75,7 +77,8 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
         &self.bodies[body].part.mesh.extent
     }
 
-    /// Return the groups of at least two bodies that pairs connect, in the order of their first bodies. A group before an obstacle does not move as one.
+    /// Return the groups of at least two bodies that pairs connect, in the order of their first bodies. A group before
+    /// an obstacle does not move as one.
     fn groups(&self) -> Vec<Vec<usize>> {
         let count = self.bodies.len();
         let (apart, before): (Vec<_>, Vec<_>) =
@@ -135,8 +138,8 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
 
     /// Return the motions that contact does not resist, and those that facets alone resist.
     ///
-    /// Motions are of size one. So a motion that closes less than the error of the normals is free, and so is one that closes less than the root of
-    /// [`TOLERANCE`], the error of coordinates on curves.
+    /// Motions are of size one. So a motion that closes less than the error of the normals is free, and so is one that
+    /// closes less than the root of [`TOLERANCE`], the error of coordinates on curves.
     fn kernel(&self, squares: &Squares) -> Vec<DVector<f64>> {
         let Squares { closing, leaning, .. } = squares;
         let mut held = closing.clone();
@@ -172,8 +175,8 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
 
     /// Return the [`Squares`] of all pairs.
     ///
-    /// The displacement between the two sides is that of both motions at the position of the point. So bodies that move as one close nothing, whatever
-    /// the rows of a mesh say where curved surfaces are apart.
+    /// The displacement between the two sides is that of both motions at the position of the point. So bodies that move
+    /// as one close nothing, whatever the rows of a mesh say where curved surfaces are apart.
     fn squares(&self) -> Squares {
         let sizes: Vec<usize> = (0..self.bodies.len()).map(|body| self.unconstrained(body).len()).collect();
         let [mut closing, mut leaning, mut error] = [0; 3].map(|_| Blocks::new(&sizes));
@@ -197,11 +200,13 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
         Squares { closing, leaning, error }
     }
 
-    /// Turn the normals of all pairs across the motions that are fixed, so that contact does not resist them to the last digit.
+    /// Turn the normals of all pairs across the motions that are fixed, so that contact does not resist them to the
+    /// last digit.
     ///
-    /// Let V hold the relative displacements v_j of both sides at a point, averaged as its rows do. The new normal is the direction of
-    /// (I + V V' / s)^-1 n with s = [`TOLERANCE`]: the part of n along V vanishes. If two motions span all directions, as those of two discs
-    /// that turn for themselves nearly do, the direction is that of least displacement.
+    /// Let V hold the relative displacements v_j of both sides at a point, averaged as its rows do. The new normal is
+    /// the direction of (I + V V' / s)^-1 n with s = [`TOLERANCE`]: the part of n along V vanishes. If two motions span
+    /// all directions, as those of two discs that turn for themselves nearly do, the direction is that of least
+    /// displacement.
     fn turn_normals(&mut self) {
         if self.fixed.is_empty() {
             return;
@@ -258,7 +263,8 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
         unit(std::array::from_fn(|c| turned[c]))
     }
 
-    /// Return the displacements of the points of a pair by the motions of a body, one column each, times the root of the share of each point in the area.
+    /// Return the displacements of the points of a pair by the motions of a body, one column each, times the root of
+    /// the share of each point in the area.
     fn at_points(&self, body: usize, pair: &ContactPair) -> DMatrix<f64> {
         let (motions, datum) = (self.unconstrained(body), &self.bodies[body].part.mesh.space.datum);
         let area: f64 = pair.area.iter().sum();
@@ -329,7 +335,8 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
         self.bodies.iter_mut().for_each(WholeBody::find_motions);
     }
 
-    /// Return motions of the same bodies with their names. Where the bodies move as one, translations and rotations are apart.
+    /// Return motions of the same bodies with their names. Where the bodies move as one, translations and rotations are
+    /// apart.
     fn named(&self, set: Vec<GroupMotion<D>>) -> Vec<(String, GroupMotion<D>)> {
         let whole = self.common(&set[0].bodies);
         let at = |bodies: &[usize], motion: &dyn Fn(usize) -> RigidMotion<D>| -> Vec<f64> {
@@ -382,16 +389,18 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
         few(each.map(name)).join(", ")
     }
 
-    /// Return the work of the loads on a motion, as a share of the work that forces of their sizes could do; zero if it is rounding.
+    /// Return the work of the loads on a motion, as a share of the work that forces of their sizes could do; zero if it
+    /// is rounding.
     fn work(&self, moving: &GroupMotion<D>) -> f64 {
         let [work, largest] = moving.works(self.bodies);
         if work.abs() <= largest * NO_WORK { 0.0 } else { work / largest }
     }
 
-    /// Change the loads so that they do no work on any of these motions m_j. `works` holds the works w_j that the loads do on them.
+    /// Change the loads so that they do no work on any of these motions m_j. `works` holds the works w_j that the loads
+    /// do on them.
     ///
-    /// Each nodal force f changes along the motions in proportion to its magnitude, by -|f| sum_j b_j m_j at its node. The amounts
-    /// b_j solve
+    /// Each nodal force f changes along the motions in proportion to its magnitude, by -|f| sum_j b_j m_j at its node.
+    /// The amounts b_j solve
     ///
     /// ```text
     /// sum_k G_jk b_k = w_j,      G_jk = sum_nodes |f| m_j . m_k,
@@ -432,8 +441,8 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
         }
     }
 
-    /// Fix a dof against a motion, without the parts that earlier dofs hold. Return its body, the largest one with a suitable node
-    /// where the motion is not small.
+    /// Fix a dof against a motion, without the parts that earlier dofs hold. Return its body, the largest one with a
+    /// suitable node where the motion is not small.
     fn pin(&mut self, moving: GroupMotion<D>, pins: &mut Vec<Pin>) -> Option<usize> {
         let mut amounts = moving.amounts;
         for pin in pins.iter() {
@@ -459,13 +468,15 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
     }
 }
 
-/// Quadratic forms of the motions of all bodies. Let u be the displacement between the two sides at a point with the normal n.
+/// Quadratic forms of the motions of all bodies. Let u be the displacement between the two sides at a point with the
+/// normal n.
 struct Squares {
     /// Mean squares of the closings n.u, summed over pairs.
     closing: Blocks,
     /// Mean squares of (n_f - n).u with the normals n_f of the facets around.
     leaning: Blocks,
-    /// The same over the number of points of the pair: the square of the error that normals which lean at random leave in the mean closing.
+    /// The same over the number of points of the pair: the square of the error that normals which lean at random leave
+    /// in the mean closing.
     error: Blocks,
 }
 
@@ -486,15 +497,17 @@ impl Squares {
         if all_near { rounded } else { motions }
     }
 
-    /// Return a motion without the part on which loads work, if that may be an error. `yielding` are the motions by which contact yields to the loads.
+    /// Return a motion without the part on which loads work, if that may be an error. `yielding` are the motions by
+    /// which contact yields to the loads.
     fn unloaded(&self, motion: DVector<f64>, loads: &DVector<f64>, yielding: &DVector<f64>) -> DVector<f64> {
         let unloaded = &motion - loads.dot(&motion) / loads.dot(yielding) * yielding;
         if self.is_near(&unloaded, &motion) { unloaded } else { motion }
     }
 }
 
-/// Share of a motion below which a part of it may be an error of the normals of facets. On the coarsest round parts, with twelve facets around, normals of
-/// single facets lean by 0.15, and their mean over three dozen points by a sixth of that.
+/// Share of a motion below which a part of it may be an error of the normals of facets. On the coarsest round parts,
+/// with twelve facets around, normals of single facets lean by 0.15, and their mean over three dozen points by a sixth
+/// of that.
 const SLIGHT: f64 = 0.03;
 
 /// Return n.u at each point for the displacements u in each column.
@@ -508,7 +521,8 @@ fn turned<const D: usize>(u: &DMatrix<f64>, spread: &[[[f64; 3]; 3]]) -> DMatrix
     DMatrix::from_fn(D * spread.len(), u.ncols(), of)
 }
 
-/// Return a basis of the weights x with x'Ax <= x'Bx, for a positive semidefinite A and a positive definite B; `None` if these are all, or B is not definite.
+/// Return a basis of the weights x with x'Ax <= x'Bx, for a positive semidefinite A and a positive definite B; `None`
+/// if these are all, or B is not definite.
 fn less(a: &DMatrix<f64>, b: DMatrix<f64>) -> Option<Vec<DVector<f64>>> {
     let root = b.cholesky()?.unpack();
     let half = root.solve_lower_triangular(a)?;
@@ -518,9 +532,9 @@ fn less(a: &DMatrix<f64>, b: DMatrix<f64>) -> Option<Vec<DVector<f64>>> {
     (least.len() < a.nrows()).then(|| least.into_iter().filter_map(vector).collect())
 }
 
-/// Share of the mean square by which the normals of facets lean along a motion, below which the mean square of its closings may be their error: the
-/// motion then closes less than half of what single facets would. A pin in a hub has up to 0.12 of it (turns 0.05), a plug in a taper of 1:20 twice as
-/// much as all of it with 24 facets around.
+/// Share of the mean square by which the normals of facets lean along a motion, below which the mean square of its
+/// closings may be their error: the motion then closes less than half of what single facets would. A pin in a hub has
+/// up to 0.12 of it (turns 0.05), a plug in a taper of 1:20 twice as much as all of it with 24 facets around.
 const DOUBT: f64 = 0.25;
 
 /// Share of the largest displacement from which a node can fix a motion; two of its digits are lost there.

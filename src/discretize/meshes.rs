@@ -18,19 +18,22 @@ pub trait Meshes {
     /// Recover smoother fields from the displacements `u` of all nodes of a body.
     fn recover<'a>(&'a self, body: usize, u: &'a [f64]) -> Box<dyn RecoveredFields + 'a>;
 
-    /// Return the displacements of all nodes of a body in the rigid motions that its supports leave, with these amounts.
+    /// Return the displacements of all nodes of a body in the rigid motions that its supports leave, with these
+    /// amounts.
     fn moved(&self, body: usize, amounts: &[f64]) -> Vec<f64>;
 
     /// Return the magnitude of the nodal force at each entry of `load`, which holds forces at all nodes of a body.
     fn sizes(&self, body: usize, load: &[f64]) -> Vec<f64>;
 
-    /// Return the outer normal displacement at the integration points of a side of a pair, for displacements `u` of all nodes of its body.
+    /// Return the outer normal displacement at the integration points of a side of a pair, for displacements `u` of all
+    /// nodes of its body.
     fn normal_displacement(&self, pair: usize, side: usize, u: &[f64]) -> Vec<f64>;
 
     /// Return the integration points of a pair.
     fn points(&self, pair: usize) -> &FinePoints;
 
-    /// Return the vertices of the facet at an integration point of a side of a pair, with the barycentric coordinates of the point.
+    /// Return the vertices of the facet at an integration point of a side of a pair, with the barycentric coordinates
+    /// of the point.
     fn vertices(&self, pair: usize, side: usize, point: usize) -> Vec<(u32, f64)>;
 
     /// Return the cells of a body.
@@ -48,8 +51,8 @@ pub struct BodyCells {
     pub stride: usize,
     /// Node numbers of the corners, `stride` per cell.
     pub corners: Vec<u32>,
-    /// Node numbers of the corners of the boundary facets, `stride - 1` per facet, oriented outwards. Facets on an axis of
-    /// revolution are excluded.
+    /// Node numbers of the corners of the boundary facets, `stride - 1` per facet, oriented outwards. Facets on an axis
+    /// of revolution are excluded.
     pub facets: Vec<u32>,
     /// Size of each cell: the edge of the regular simplex with the measure of the cell.
     pub sizes: Vec<f64>,
@@ -60,17 +63,21 @@ pub trait RecoveredFields {
     /// Return the errors of the body, see [`Recovery::errors`].
     fn errors(&self, work_on_missed: f64) -> Errors;
 
-    /// Return the products of the errors of this displacement and of the displacements `other` of all nodes in each cell, see [`Recovery::products`].
+    /// Return the products of the errors of this displacement and of the displacements `other` of all nodes in each
+    /// cell, see [`Recovery::products`].
     fn products(&self, other: &[f64]) -> Vec<f64>;
 
-    /// Return the work `sum force_g n.b` of forces at the integration points of a side of a pair on the interpolation error b.
+    /// Return the work `sum force_g n.b` of forces at the integration points of a side of a pair on the interpolation
+    /// error b.
     fn work_on_missed(&self, pair: usize, side: usize, force: &[f64]) -> f64;
 
-    /// Return the outer normal displacement at the integration points of a side of a pair, including the interpolation error.
+    /// Return the outer normal displacement at the integration points of a side of a pair, including the interpolation
+    /// error.
     fn recovered_displacement(&self, pair: usize, side: usize) -> Vec<f64>;
 
-    /// Return, at each contact point of a pair, how much the compression changes if the mean around the point is replaced by the
-    /// value at the point itself. The body is side b of the pair, and `rows` are the rows B_b of its nodal displacements.
+    /// Return, at each contact point of a pair, how much the compression changes if the mean around the point is
+    /// replaced by the value at the point itself. The body is side b of the pair, and `rows` are the rows B_b of its
+    /// nodal displacements.
     fn beyond_means(&self, pair: usize, rows: &Csr) -> Vec<f64>;
 
     /// Add `sum force_g n.v` over the integration points of a side of a pair to `r`, for every shape function v.

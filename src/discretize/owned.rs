@@ -23,8 +23,8 @@ pub struct OwnedDofs {
 }
 
 impl OwnedDofs {
-    /// Return the rows of owned dofs of the interpolation that `whole` makes from coarse nodes. Columns are numbered through all
-    /// bodies in one matrix.
+    /// Return the rows of owned dofs of the interpolation that `whole` makes from coarse nodes. Columns are numbered
+    /// through all bodies in one matrix.
     pub fn interpolation<const D: usize>(&self, whole: impl FnOnce(&[u32]) -> Prolongation) -> Prolongation {
         let whole = whole(&self.coarse_nodes);
         let mut rows = Csr::new(D * self.coarse_count);
@@ -41,8 +41,8 @@ impl OwnedDofs {
         (*first..first + own.len()).contains(&(D * self.number[node] as usize))
     }
 
-    /// Restrict a body that was assembled for owned nodes to the owned dofs. The columns of K become those of the matrix with its
-    /// rows.
+    /// Restrict a body that was assembled for owned nodes to the owned dofs. The columns of K become those of the
+    /// matrix with its rows.
     pub fn restrict<const D: usize>(&self, body: ElasticBody) -> ElasticBody {
         let (own, loads) = (&self.distribution.owned_positions, self.distribution.restrict(&body));
         let Csr { ptr, mut col, mut values, .. } = body.stiffness;

@@ -1,5 +1,5 @@
-//! Contacts of the scene on the mesh: the body that each surface bounds, the side that carries the points, and why two surfaces do not face
-//! each other.
+//! Contacts of the scene on the mesh: the body that each surface bounds, the side that carries the points, and why two
+//! surfaces do not face each other.
 
 use super::auto::{self, SurfacePair};
 use super::bodies::SceneBody;
@@ -112,7 +112,8 @@ impl Facing {
     }
 }
 
-/// Return the corners of a facet as sorted points of the mesh, which are three in space. In the plane the last one is no point.
+/// Return the corners of a facet as sorted points of the mesh, which are three in space. In the plane the last one is
+/// no point.
 pub fn corners(points: impl Iterator<Item = u32>) -> [u32; 3] {
     let mut corners = [u32::MAX; 3];
     corners.iter_mut().zip(points).for_each(|(corner, point)| *corner = point);
@@ -121,7 +122,8 @@ pub fn corners(points: impl Iterator<Item = u32>) -> [u32; 3] {
 }
 
 impl ContactFacts {
-    /// Return the description of the pair by the `contacts` of the scene. `between` names the bodies if the pair was found.
+    /// Return the description of the pair by the `contacts` of the scene. `between` names the bodies if the pair was
+    /// found.
     pub fn spec(&self, contacts: &[ContactSpec]) -> ContactSpec {
         between(&contacts[self.table], self.names.clone())
     }
@@ -140,11 +142,13 @@ fn between(spec: &ContactSpec, names: [String; 2]) -> ContactSpec {
     spec
 }
 
-/// Return all pairs of the scene: first the named ones in the order of the file, then those that are found. `fine` requests integration points.
-/// Pairs of an earlier problem that serve get the gap, the law and the supports of this one.
+/// Return all pairs of the scene: first the named ones in the order of the file, then those that are found. `fine`
+/// requests integration points. Pairs of an earlier problem that serve get the gap, the law and the supports of this
+/// one.
 ///
 /// # Errors
-/// A surface is missing, bounds no body or several, or does not face its partner. A law or a gap has no value somewhere.
+/// A surface is missing, bounds no body or several, or does not face its partner. A law or a gap has no value
+/// somewhere.
 pub fn all<const D: usize>(
     scene: &Scene,
     mesh: &Mesh<D>,
@@ -264,7 +268,8 @@ fn check(pair: &ContactPair, spec: &ContactSpec) -> Result<()> {
     Ok(())
 }
 
-/// Refuse two layers between the same facets. A facet may face facets of several surfaces, each with a layer of its own.
+/// Refuse two layers between the same facets. A facet may face facets of several surfaces, each with a layer of its
+/// own.
 ///
 /// # Errors
 /// Two of the contacts have a facet with the same partner.
@@ -343,10 +348,7 @@ impl<'a, const D: usize> SurfacePair<'a, D> {
     fn common(&mut self, cut: Cut<D>) -> (Intersection<D>, bool) {
         let (spec, [a, b]) = (self.spec, &mut self.sides);
         let reach = Reach::between(a, b, spec.angle, spec.distance);
-        let mut common = match spec.obstacle {
-            true => Intersection::of_one(a),
-            false => cut(a, b, &reach),
-        };
+        let mut common = if spec.obstacle { Intersection::of_one(a) } else { cut(a, b, &reach) };
         if !spec.obstacle && a.towards(b, &common) {
             common = cut(a, b, &reach);
         }
@@ -364,8 +366,8 @@ impl<'a, const D: usize> SurfacePair<'a, D> {
         (common, is_through)
     }
 
-    /// Assemble the pair, and its integration points if `fine` requests them. Return none if the surfaces of a pair that was found have no common
-    /// piece.
+    /// Assemble the pair, and its integration points if `fine` requests them. Return none if the surfaces of a pair
+    /// that was found have no common piece.
     fn assemble(
         mut self,
         laws: &OwnLaws,
@@ -396,13 +398,12 @@ impl<'a, const D: usize> SurfacePair<'a, D> {
             Some(part) => jumping(side.space, &part.elasticity, &side.facets.nodes),
             None => HashSet::new(),
         };
-        let fine = match fine {
-            true => {
-                let [mut at_a, at_b] = [jumps(0, &a), jumps(1, &b)];
-                at_a.extend(a.layer_jumps(&law)?);
-                Some(Fine::new(&a, &b, &common, &pair, &gap, is_touching, [&at_a, &at_b]))
-            }
-            false => None,
+        let fine = if fine {
+            let [mut at_a, at_b] = [jumps(0, &a), jumps(1, &b)];
+            at_a.extend(a.layer_jumps(&law)?);
+            Some(Fine::new(&a, &b, &common, &pair, &gap, is_touching, [&at_a, &at_b]))
+        } else {
+            None
         };
         let chords = if is_touching { None } else { Chords::of(&a, &b, &common, &pair) };
         let ends = spec.distance.map_or(Vec::new(), |_| contact::ends(&a, &common, &pair, &far));
@@ -416,13 +417,14 @@ impl<'a, const D: usize> SurfacePair<'a, D> {
     }
 }
 
-/// Overlap of two faces that look away from each other, at least, relative to the size of a facet: the plate between them is thicker than a hundredth of
-/// its facets. The two faces of a cut overlap by less, since their meshes are of one curve.
+/// Overlap of two faces that look away from each other, at least, relative to the size of a facet: the plate between
+/// them is thicker than a hundredth of its facets. The two faces of a cut overlap by less, since their meshes are of
+/// one curve.
 const THINNEST: f64 = 0.01;
 
-/// Return whether two surfaces look away from each other, with the material of their bodies between them, as the faces under head and nut of a bolt:
-/// each is behind the other, and body b does not lie before body a. Surfaces that overlap are behind each other, too, but their bodies
-/// lie before each other.
+/// Return whether two surfaces look away from each other, with the material of their bodies between them, as the faces
+/// under head and nut of a bolt: each is behind the other, and body b does not lie before body a. Surfaces that overlap
+/// are behind each other, too, but their bodies lie before each other.
 fn look_away<const D: usize>(a: &Side<D>, b: &Side<D>, common: &Intersection<D>) -> bool {
     let [behind, whole] = common
         .points
@@ -437,7 +439,8 @@ fn look_away<const D: usize>(a: &Side<D>, b: &Side<D>, common: &Intersection<D>)
     behind > whole * THINNEST * a.mean_measure().powf(1.0 / (D - 1) as f64) && along <= 0.0
 }
 
-/// Return the reason that names the pair in an error at an expression. The table of the expression may be for many pairs.
+/// Return the reason that names the pair in an error at an expression. The table of the expression may be for many
+/// pairs.
 fn of_pair(spec: &ContactSpec) -> String {
     let [a, b] = spec.between.each_ref().map(|name| &name.value);
     format!("it is for the contact of `{a}` and `{b}`")

@@ -1,5 +1,5 @@
-//! The partition of the nodes of bodies over the ranks. Each node of the bodies in one matrix has one owner, and a number in that
-//! matrix. The coupling of the nodes determines the work and the memory of each.
+//! The partition of the nodes of bodies over the ranks. Each node of the bodies in one matrix has one owner, and a
+//! number in that matrix. The coupling of the nodes determines the work and the memory of each.
 
 use super::body::BodyMesh;
 use super::owned::OwnedDofs;
@@ -30,8 +30,8 @@ pub struct Partition {
     products: Vec<DMatrix<f64>>,
 }
 
-/// Numbers of nodes of the bodies in one matrix. They run rank by rank, within a rank body by body, and within a body in the
-/// order of the nodes.
+/// Numbers of nodes of the bodies in one matrix. They run rank by rank, within a rank body by body, and within a body
+/// in the order of the nodes.
 struct Numbers {
     /// Number of each node of each body; [`NONE`] for nodes without a number.
     of_node: Vec<Vec<u32>>,
@@ -39,7 +39,8 @@ struct Numbers {
     counts: Vec<Vec<usize>>,
 }
 
-/// The mark of a node without a number. No node has it, since numbers of dofs, at least twice as large, fit 32 bits with a sign.
+/// The mark of a node without a number. No node has it, since numbers of dofs, at least twice as large, fit 32 bits
+/// with a sign.
 const NONE: u32 = u32::MAX;
 
 impl Numbers {
@@ -77,9 +78,9 @@ impl Numbers {
 }
 
 impl Partition {
-    /// Distribute the nodes of the bodies in `set` by recursive bisection. The weight of a node is the number of nodes with which it is
-    /// coupled in the matrix. The pole of a rigid surface that turns gets the owner of the master. `wants_coarse(body)` returns whether
-    /// a body is interpolated from its coarse nodes.
+    /// Distribute the nodes of the bodies in `set` by recursive bisection. The weight of a node is the number of nodes
+    /// with which it is coupled in the matrix. The pole of a rigid surface that turns gets the owner of the master.
+    /// `wants_coarse(body)` returns whether a body is interpolated from its coarse nodes.
     pub fn new<const D: usize>(
         set: Vec<usize>,
         bodies: &[WholeBody<D>],
@@ -121,7 +122,8 @@ impl Partition {
         (0..self.ranks).filter(|&rank| self.nodes.counts[rank][number] > 0).collect()
     }
 
-    /// Return the part of a body on the nodes that a rank needs, or on all nodes if `wants_all`. `number` is the index of the body in its matrix.
+    /// Return the part of a body on the nodes that a rank needs, or on all nodes if `wants_all`. `number` is the index
+    /// of the body in its matrix.
     pub fn restrict<const D: usize>(
         &self,
         body: &BodyMesh<D>,
@@ -129,10 +131,7 @@ impl Partition {
         rank: usize,
         wants_all: bool,
     ) -> BodyMesh<D> {
-        let cells = match wants_all {
-            true => (0..body.space.cell_count()).collect(),
-            false => self.cells(number, body, rank),
-        };
+        let cells = if wants_all { (0..body.space.cell_count()).collect() } else { self.cells(number, body, rank) };
         let nodes = self.nodes(number, body, &cells, rank);
         let here = |node: u32| place(&nodes, node);
         let dof_here = |dof: usize| Some(D * here((dof / D) as u32)? as usize + dof % D);
@@ -167,9 +166,9 @@ impl Partition {
         }
     }
 
-    /// Return the indices of the cells of a body that a rank needs. These are the cells at its owned nodes, and all cells that
-    /// touch these. So the rank has every cell at a node of the cells at its owned nodes. Tied nodes are assembled on the rank of
-    /// their master.
+    /// Return the indices of the cells of a body that a rank needs. These are the cells at its owned nodes, and all
+    /// cells that touch these. So the rank has every cell at a node of the cells at its owned nodes. Tied nodes are
+    /// assembled on the rank of their master.
     fn cells<const D: usize>(&self, number: usize, body: &BodyMesh<D>, rank: usize) -> Vec<usize> {
         let BodyMesh { space, held, .. } = body;
         let is_own = |node: &u32| self.owner(number, held.frame.node(*node)) == rank;
@@ -182,8 +181,8 @@ impl Partition {
         cells().enumerate().filter(|(_, cell)| is_wanted(cell)).map(|(cell, _)| cell).collect()
     }
 
-    /// Return the nodes of a body that a rank with these cells needs, sorted. They are its owned nodes, those of its cells and of
-    /// contact rows, and those that move tied nodes.
+    /// Return the nodes of a body that a rank with these cells needs, sorted. They are its owned nodes, those of its
+    /// cells and of contact rows, and those that move tied nodes.
     fn nodes<const D: usize>(&self, number: usize, body: &BodyMesh<D>, cells: &[usize], rank: usize) -> Vec<u32> {
         let BodyMesh { space, held, .. } = body;
         let own = (0..space.nodes.len() as u32).filter(|&node| self.owner(number, node) == rank);
@@ -239,8 +238,9 @@ impl Partition {
     }
 }
 
-/// Return, for each node of the bodies in `set`, the number of nodes with which it is coupled in a matrix of all of them, itself
-/// included. Nodes are coupled by the cells around them and by contact rows. The result runs over one body after the other.
+/// Return, for each node of the bodies in `set`, the number of nodes with which it is coupled in a matrix of all of
+/// them, itself included. Nodes are coupled by the cells around them and by contact rows. The result runs over one body
+/// after the other.
 fn couplings<const D: usize>(bodies: &[WholeBody<D>], set: &[usize], pairs: &[ContactPair]) -> Vec<u32> {
     let (mut first, mut all) = (HashMap::new(), Vec::new());
     for &body in set {

@@ -1,5 +1,5 @@
-//! The single bodies of the tables of a scene. Tables, and the lines in them, may stand for many bodies by patterns of names; the last table
-//! that matches counts. Errors point into the scene.
+//! The single bodies of the tables of a scene. Tables, and the lines in them, may stand for many bodies by patterns of
+//! names; the last table that matches counts. Errors point into the scene.
 
 use super::groups::{Line, Owners};
 use crate::error::{Error, Located, Result, few};
@@ -13,8 +13,9 @@ use std::collections::{BTreeSet, HashMap};
 
 /// Return the bodies of a scene, table by table. The bodies of a pattern are in the order of the mesh.
 ///
-/// `lying` are the groups on each body ([`lying`]). A body that several tables match belongs to the last of these. A line on groups named by a pattern acts on all groups that
-/// match and lie on the body. In a table of a pattern, every line acts on those bodies on which its group lies.
+/// `lying` are the groups on each body ([`lying`]). A body that several tables match belongs to the last of these. A
+/// line on groups named by a pattern acts on all groups that match and lie on the body. In a table of a pattern, every
+/// line acts on those bodies on which its group lies.
 ///
 /// # Errors
 /// A table has no body, a group cannot name a body, a line acts on no body, or a total force acts on several surfaces.
@@ -39,8 +40,8 @@ pub fn bodies<const D: usize>(scene: &Scene, mesh: &Mesh<D>, lying: &[Vec<u32>])
     Ok(bodies)
 }
 
-/// Give the bodies of a table those of its lines that act on them, each with the name of a single group. `groups` are those that lie on each
-/// body.
+/// Give the bodies of a table those of its lines that act on them, each with the name of a single group. `groups` are
+/// those that lie on each body.
 ///
 /// # Errors
 /// A line acts on no body.
@@ -57,9 +58,10 @@ fn give<L: Line, const D: usize>(
         let is_of_kind = |group: &&&Group| line.dimensions::<D>().contains(&group.dimension);
         for (body, groups) in bodies.iter_mut().zip(groups) {
             let wanted = Located::new(on.value.replace(BODY, &body.name.value), on.place.clone());
-            let found = match is_for_many(table) || is_open(&on.value) {
-                true => called(&wanted, groups.iter().filter(is_of_kind))?,
-                false => vec![&on.value],
+            let found = if is_for_many(table) || is_open(&on.value) {
+                called(&wanted, groups.iter().filter(is_of_kind))?
+            } else {
+                vec![&on.value]
             };
             acts |= !found.is_empty();
             L::of(body).extend(found.into_iter().map(|group| line.on_group(group)));
@@ -98,7 +100,8 @@ fn refuse_totals(table: &BodySpec, made: &[BodySpec]) -> Result<()> {
     Ok(())
 }
 
-/// Return whether a table stands for many bodies: its name is a pattern, or it splits groups into their connected parts.
+/// Return whether a table stands for many bodies: its name is a pattern, or it splits groups into their connected
+/// parts.
 fn is_for_many(table: &BodySpec) -> bool {
     is_pattern(&table.name.value) || table.split
 }
@@ -120,8 +123,8 @@ pub fn pattern(name: &Located<String>) -> Result<Pattern<'_>> {
     Pattern::new(&name.value).map_err(|flaw| Error::scene(&name.place, flaw))
 }
 
-/// Return the last table of the scene that matches a group of cells by its name, where `whole` is the group of which it is a connected
-/// part. A table that splits groups stands for the parts of the groups that it matches.
+/// Return the last table of the scene that matches a group of cells by its name, where `whole` is the group of which it
+/// is a connected part. A table that splits groups stands for the parts of the groups that it matches.
 fn table_of(scene: &Scene, patterns: &[Pattern], name: &str, whole: Option<&str>) -> Option<usize> {
     let called = |table: usize| if scene.bodies[table].split { whole } else { Some(name) };
     (0..patterns.len()).rev().find(|&table| called(table).is_some_and(|name| patterns[table].matches(name)))
@@ -191,8 +194,9 @@ pub fn members<'a, const D: usize>(scene: &'a Scene, mesh: &'a Mesh<D>) -> Resul
     Ok(members)
 }
 
-/// Return the indices of the groups that lie on each body, for the bodies of each table in turn: its own cells, and each group with an element whose corners
-/// all belong to the body. The list is empty if no table or line stands for many.
+/// Return the indices of the groups that lie on each body, for the bodies of each table in turn: its own cells, and
+/// each group with an element whose corners all belong to the body. The list is empty if no table or line stands for
+/// many.
 ///
 /// # Errors
 /// A pattern of bodies matches nothing or too much.
@@ -230,8 +234,8 @@ pub fn lying<const D: usize>(scene: &Scene, mesh: &Mesh<D>) -> Result<Vec<Vec<u3
     Ok(lying)
 }
 
-/// Return the names of the groups that a name or pattern of the scene means. If none has such a name, those with the same plain
-/// form count.
+/// Return the names of the groups that a name or pattern of the scene means. If none has such a name, those with the
+/// same plain form count.
 fn called<'a>(wanted: &Located<String>, groups: impl Iterator<Item = &'a &'a Group>) -> Result<Vec<&'a String>> {
     let names: Vec<&String> = groups.map(|group| &group.name).collect();
     let exact = pattern(wanted)?;

@@ -1,4 +1,5 @@
-//! Evaluation of the displacements of a body: fields for output, forces and their balance, errors against a known solution. Each rank evaluates its part.
+//! Evaluation of the displacements of a body: fields for output, forces and their balance, errors against a known
+//! solution. Each rank evaluates its part.
 
 use super::body::BodyMesh;
 use super::groups::point;
@@ -13,9 +14,10 @@ use std::rc::Rc;
 
 /// A part of a body that is evaluated for states of the dofs of its nodes, without the space dimension.
 pub trait Post {
-    /// Return displacements and stresses of the cells that this rank writes, at nodes, and above order two at equally spaced points in their place. A node where the material jumps is several points, one for each
-    /// material. `bent` is the state without the rigid motion that
-    /// supports leave. Stresses come from `bent`, since a large rigid motion leaves few digits to the deformation.
+    /// Return displacements and stresses of the cells that this rank writes, at nodes, and above order two at equally
+    /// spaced points in their place. A node where the material jumps is several points, one for each material. `bent`
+    /// is the state without the rigid motion that supports leave. Stresses come from `bent`, since a large rigid motion
+    /// leaves few digits to the deformation.
     fn field(&self, v: &[f64], bent: &[f64]) -> BodyField;
 
     /// Return the largest strain in the cells that this rank writes. `bent` is as in [`Post::field`].
@@ -30,16 +32,17 @@ pub trait Post {
     /// Return the contribution of owned nodes to the displacement of the body towards each of its contact surfaces.
     fn approach(&self, v: &[f64]) -> Vec<f64>;
 
-    /// Return the norms of the error against the known displacements of the scene, and the norms of these displacements. They are
-    /// the L2 norm, the H1 seminorm and the energy norm ([`displacement::norms_of_error`]) on the cells that this rank writes. The result is
-    /// `None` if the scene has no known displacements.
+    /// Return the norms of the error against the known displacements of the scene, and the norms of these
+    /// displacements. They are the L2 norm, the H1 seminorm and the energy norm ([`displacement::norms_of_error`]) on
+    /// the cells that this rank writes. The result is `None` if the scene has no known displacements.
     fn errors(&self, v: &[f64]) -> Option<[[f64; 3]; 2]>;
 }
 
-/// A body with its elasticity, or the cells that one rank has of it, with their nodes in local numbers: the implementation of [`Post`] in `D` dimensions.
+/// A body with its elasticity, or the cells that one rank has of it, with their nodes in local numbers: the
+/// implementation of [`Post`] in `D` dimensions.
 ///
-/// The cells around owned nodes are complete, and so are those around the cells that touch owned nodes. Nodes of contact rows and
-/// masters of tied nodes are included.
+/// The cells around owned nodes are complete, and so are those around the cells that touch owned nodes. Nodes of
+/// contact rows and masters of tied nodes are included.
 pub struct FemBody<const D: usize> {
     /// Name of the body.
     pub name: String,
@@ -87,8 +90,8 @@ impl<const D: usize> FemBody<D> {
         shown.into_iter().map(|node| self.mesh.points[split.origin(node) as usize]).collect()
     }
 
-    /// Return the indices of the cells that this rank writes and measures. Each cell of the body belongs to the rank that owns
-    /// its first node.
+    /// Return the indices of the cells that this rank writes and measures. Each cell of the body belongs to the rank
+    /// that owns its first node.
     pub fn owned(&self) -> impl Iterator<Item = usize> {
         let is_own = |cell: &[u32]| cell.iter().min().is_some_and(|&first| self.own[first as usize]);
         let cells = self.mesh.space.cells.chunks_exact(self.mesh.space.stride).enumerate();
@@ -243,8 +246,8 @@ impl Resultant {
 pub struct ForceBalance {
     /// Loads without those on rigid surfaces; contacts; then each support, each spring, each rigid surface.
     pub parts: Vec<Resultant>,
-    /// Sum of the magnitudes of all nodal forces, and of these times their distances from the datum. They are the scale of the
-    /// sum of all parts. About a distant origin, moments would be little else than that of the sum of forces.
+    /// Sum of the magnitudes of all nodal forces, and of these times their distances from the datum. They are the scale
+    /// of the sum of all parts. About a distant origin, moments would be little else than that of the sum of forces.
     pub size: [f64; 2],
 }
 

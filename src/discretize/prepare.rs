@@ -87,7 +87,8 @@ impl<const D: usize> WholeProblem<'_, D> {
     }
 }
 
-/// Return the partition that contains a body, and the index of the body there. The result is `None` if the body stays whole.
+/// Return the partition that contains a body, and the index of the body there. The result is `None` if the body stays
+/// whole.
 fn place_of(partitions: &[Rc<Partition>], body: usize) -> Option<(&Partition, usize)> {
     partitions.iter().find_map(|partition| Some((&**partition, partition.bodies.binary_search(&body).ok()?)))
 }
@@ -197,8 +198,8 @@ fn partitions<const D: usize>(
     factory.distributed().into_iter().map(partition).collect()
 }
 
-/// Return for each body the rank that owns it or most of it, and all ranks that own nodes of it. A body that is not distributed
-/// stays whole; such bodies are assigned so that all ranks get about equally many of their dofs.
+/// Return for each body the rank that owns it or most of it, and all ranks that own nodes of it. A body that is not
+/// distributed stays whole; such bodies are assigned so that all ranks get about equally many of their dofs.
 fn owners<const D: usize>(
     bodies: &[WholeBody<D>],
     partitions: &[Rc<Partition>],

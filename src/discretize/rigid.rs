@@ -1,14 +1,16 @@
-//! Rigid parts of a scene: obstacles before surfaces, and offsets of gaps. Their motions are fields of closings of the points of a pair.
+//! Rigid parts of a scene: obstacles before surfaces, and offsets of gaps. Their motions are fields of closings of the
+//! points of a pair.
 //!
-//! An obstacle is given by the gap d along the normal n of the body's surface. If it moves by w against the mean normal N of the surface, and turns by the
-//! small vector t about a point, the gap closes by
+//! An obstacle is given by the gap d along the normal n of the body's surface. If it moves by w against the mean normal
+//! N of the surface, and turns by the small vector t about a point, the gap closes by
 //!
 //! ```text
 //! w n.N - t.(r x n),      r from that point to the contact point
 //! ```
 //!
-//! This is linear: as for two meshed surfaces, displacements are small beside the radii of curvature, so that the normal is that of the undeformed
-//! surface, and that the obstacle's own normal differs from it by an angle whose square is small.
+//! This is linear: as for two meshed surfaces, displacements are small beside the radii of curvature, so that the
+//! normal is that of the undeformed surface, and that the obstacle's own normal differs from it by an angle whose
+//! square is small.
 
 use super::approach::mean_normal;
 use super::groups::point;
@@ -64,8 +66,8 @@ impl<'a> Obstacle<'a> {
         both.map(|(&n, &moment)| -dot(&turn, &self.moment(n, moment))).collect()
     }
 
-    /// Return the axes about which the obstacle turns: z in the plane, in space two across the mean normal. Each is a unit vector over the largest
-    /// closing by a turn of one, so that a motion of one closes the points by one at most.
+    /// Return the axes about which the obstacle turns: z in the plane, in space two across the mean normal. Each is a
+    /// unit vector over the largest closing by a turn of one, so that a motion of one closes the points by one at most.
     fn axes(&self) -> Vec<[f64; 3]> {
         let least = (0..3).min_by(|&i, &j| self.normal[i].abs().total_cmp(&self.normal[j].abs())).unwrap_or(0);
         let across = cross(self.normal, std::array::from_fn(|c| f64::from(u8::from(c == least))));
@@ -152,8 +154,9 @@ pub fn all(scene: &Scene, pairs: &mut [ContactPair], is_through: &[bool], bodies
     Ok(found)
 }
 
-/// Return the rigid part of pair `number`, if its scene has one, as slot `index` of the model. `is_through` says whether its surfaces look away from each
-/// other: then pressures draw them together, and so does the preload of a bond.
+/// Return the rigid part of pair `number`, if its scene has one, as slot `index` of the model. `is_through` says
+/// whether its surfaces look away from each other: then pressures draw them together, and so does the preload of a
+/// bond.
 ///
 /// # Errors
 /// See [`Obstacle`]: a surface without a mean normal, and a moment about it.

@@ -1,5 +1,5 @@
-//! What holds a body: supports and rigid surfaces as conditions on its nodes, and springs to the ground. Moments on surfaces are here, too,
-//! since rigid surfaces turn about the same centre.
+//! What holds a body: supports and rigid surfaces as conditions on its nodes, and springs to the ground. Moments on
+//! surfaces are here, too, since rigid surfaces turn about the same centre.
 
 use super::groups::{FieldValues, Line, earlier, not_on_body, of_body, point, without_area};
 use crate::error::{Error, Located, Place, Result, shown};
@@ -49,7 +49,8 @@ pub struct RigidSurface<const D: usize> {
     pub forces: Vec<(u32, [f64; D])>,
 }
 
-/// Sine below which two directions are the same: half of the digits, so that what is left of the second has the other half.
+/// Sine below which two directions are the same: half of the digits, so that what is left of the second has the other
+/// half.
 const PARALLEL: f64 = 1e-8;
 
 impl<const D: usize> Constraints<D> {
@@ -93,7 +94,8 @@ impl<const D: usize> Constraints<D> {
         Ok(held)
     }
 
-    /// Restrict the constraints to the nodes in the sorted slice `nodes`, which are renumbered by their positions there.
+    /// Restrict the constraints to the nodes in the sorted slice `nodes`, which are renumbered by their positions
+    /// there.
     pub fn on(&self, nodes: &[u32]) -> Self {
         let here = |node: u32| place(nodes, node);
         let prescribed = |(dof, value): (&usize, &f64)| Some((D * here((dof / D) as u32)? as usize + dof % D, *value));
@@ -165,8 +167,8 @@ impl<const D: usize> Constraints<D> {
         Ok(())
     }
 
-    /// Let a rigid surface with these `nodes` turn. Return nodal forces that do the work of the `moment` and of the force, which acts at the
-    /// `centre`, on the rotation.
+    /// Let a rigid surface with these `nodes` turn. Return nodal forces that do the work of the `moment` and of the
+    /// force, which acts at the `centre`, on the rotation.
     fn turn(
         &mut self,
         nodes: &[u32],
@@ -184,7 +186,8 @@ impl<const D: usize> Constraints<D> {
         self.frame.couple([nodes[0], pole], std::array::from_fn(|c| moment[c] + about_master[c]), x)
     }
 
-    /// Turn the conditions at a node into prescribed dofs. If the conditions are inclined, the node gets axes of its own.
+    /// Turn the conditions at a node into prescribed dofs. If the conditions are inclined, the node gets axes of its
+    /// own.
     fn hold(&mut self, node: u32, conditions: &[Condition<D>], spec: &BodySpec, space: &Space<D>) -> Result<()> {
         let mut basis: Vec<([f64; D], f64)> = Vec::new();
         let kept = self.conditions.entry(node).or_default();
@@ -407,12 +410,12 @@ pub fn centre<const D: usize>(space: &Space<D>, facets: &Facets<D>) -> [f64; 3] 
     sum(&|x| x).map(|sum| sum / area)
 }
 
-/// Return nodal forces with a moment (x, y, z; force times length) and without a resultant. In the plane the moment has a z component
-/// alone.
+/// Return nodal forces with a moment (x, y, z; force times length) and without a resultant. In the plane the moment has
+/// a z component alone.
 ///
-/// The traction is theta x r with r = x - c, where c is the centre of the surface: stresses of a beam in bending. Its moment is
-/// J theta with J = int |r|^2 I - r r^T over the surface. All integrals are those of the quadrature of loads, so that the nodal forces
-/// have the moment to rounding on curved facets, too.
+/// The traction is theta x r with r = x - c, where c is the centre of the surface: stresses of a beam in bending. Its
+/// moment is J theta with J = int |r|^2 I - r r^T over the surface. All integrals are those of the quadrature of loads,
+/// so that the nodal forces have the moment to rounding on curved facets, too.
 pub fn moment_load<const D: usize>(space: &Space<D>, facets: &Facets<D>, moment: [f64; 3]) -> NodalForces<D> {
     let of = |traction: &dyn Fn([f64; D]) -> [f64; D]| surface::surface_load(space, facets, &|x, _| traction(x));
     let centre = centre(space, facets);

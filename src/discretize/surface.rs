@@ -1,4 +1,5 @@
-//! A contact surface of a pair: its mesh for output, which holds the facets of side a and the contact points from which their values come.
+//! A contact surface of a pair: its mesh for output, which holds the facets of side a and the contact points from which
+//! their values come.
 
 use crate::contact::{ContactPair, Coverage, Side};
 use crate::fem::{element, lagrange, space};
@@ -14,8 +15,8 @@ pub struct ContactSurface {
     points: Vec<[f64; 3]>,
     cell: CellKind,
     connectivity: Vec<u32>,
-    /// For each point of the mesh, the contact points from which its values come, with their shares. The list is empty where no
-    /// contact point contributes.
+    /// For each point of the mesh, the contact points from which its values come, with their shares. The list is empty
+    /// where no contact point contributes.
     sources: Vec<Vec<(usize, f64)>>,
     /// Share of each facet that is paired.
     cover: Vec<f64>,
@@ -97,8 +98,8 @@ impl ContactSurface {
         &self.neighbours
     }
 
-    /// Return the contact points on the corners of facets without a partner because facets before them were refused, each once or more. `cover` is the
-    /// coverage of the facets.
+    /// Return the contact points on the corners of facets without a partner because facets before them were refused,
+    /// each once or more. `cover` is the coverage of the facets.
     pub fn beside_cut_short(&self, cover: &[Coverage]) -> impl Iterator<Item = usize> {
         let facets = self.connectivity.chunks_exact(self.cell.stride()).zip(cover);
         let cut = facets.filter(|(_, cover)| cover.carriers.is_none() && cover.is_cut_short);
@@ -106,8 +107,9 @@ impl ContactSurface {
         nodes.flat_map(|&node| &self.sources[node as usize]).map(|(q, _)| *q)
     }
 
-    /// Return the mesh with arrays of values at the contact points. Points of the mesh without a contact point get NaN. Extrapolated values stay between those from which they
-    /// come, so that a pressure is never negative nor above its peak.
+    /// Return the mesh with arrays of values at the contact points. Points of the mesh without a contact point get NaN.
+    /// Extrapolated values stay between those from which they come, so that a pressure is never negative nor above its
+    /// peak.
     pub fn grid(&self, name: String, arrays: Vec<FieldArray>) -> UnstructuredGrid {
         let spread = |components: usize, values: &[f64]| {
             let at = |sources: &Vec<(usize, f64)>, c: usize| {
@@ -137,7 +139,8 @@ impl ContactSurface {
     }
 }
 
-/// Return the contact points that are neighbours on the facets of side a. `point_of` is the contact point of each node on a face.
+/// Return the contact points that are neighbours on the facets of side a. `point_of` is the contact point of each node
+/// on a face.
 fn neighbours<const D: usize>(a: &Side<D>, pair: &ContactPair, point_of: &[Option<usize>]) -> Vec<Neighbours> {
     let mut all = Vec::new();
     for (facet, &Coverage { share, .. }) in pair.cover.iter().enumerate().filter(|(_, cover)| cover.carriers.is_some())

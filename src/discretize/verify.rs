@@ -1,5 +1,5 @@
-//! Checks of the mesh against the scene before anything is assembled. Surfaces that a scene names by sets of nodes, as meshes of other
-//! programs have them, become groups of facets first.
+//! Checks of the mesh against the scene before anything is assembled. Surfaces that a scene names by sets of nodes, as
+//! meshes of other programs have them, become groups of facets first.
 
 use super::groups::earlier;
 use super::patterns;
@@ -29,7 +29,8 @@ pub struct Verified<const D: usize> {
     lying: Vec<Vec<u32>>,
     /// The scene for which the mesh was checked.
     scene: Scene,
-    /// Result of the check for each body, in the same order, on the first rank. Bodies that the mesh does not have are missing.
+    /// Result of the check for each body, in the same order, on the first rank. Bodies that the mesh does not have are
+    /// missing.
     pub checked: Rc<[BodyCheck]>,
     /// What is to be said of the file, and of surfaces that are sets of nodes, on the first rank.
     pub notes: Vec<String>,
@@ -49,12 +50,12 @@ struct MeshHeader {
     lying: Vec<Vec<u32>>,
 }
 
-/// Find the bodies of a scene and check its mesh once, see `patterns::bodies` and [`Mesh::check`]. The first rank reads and
-/// checks the mesh. Collective.
+/// Find the bodies of a scene and check its mesh once, see `patterns::bodies` and [`Mesh::check`]. The first rank reads
+/// and checks the mesh. Collective.
 ///
 /// # Errors
-/// `read` fails, a pattern does not fit the mesh, or the mesh cannot be that of a body. The last error names the body, the place
-/// and the elements.
+/// `read` fails, a pattern does not fit the mesh, or the mesh cannot be that of a body. The last error names the body,
+/// the place and the elements.
 pub fn verify<const D: usize>(
     scene: &Scene,
     exchange: &dyn Exchange,
@@ -197,8 +198,8 @@ enum Need {
     Cells,
 }
 
-/// Replace each group of points that the scene names as a surface by facets: those of the boundary of a body all of whose nodes
-/// belong to the group. Return what is to be said of nodes that belong to no such facet.
+/// Replace each group of points that the scene names as a surface by facets: those of the boundary of a body all of
+/// whose nodes belong to the group. Return what is to be said of nodes that belong to no such facet.
 ///
 /// # Errors
 /// The scene names the group for points, too, and some of these would be lost.
@@ -250,12 +251,14 @@ fn refuse_points(own: &[(&Located<String>, Need)], lost: usize) -> Result<()> {
     }
 }
 
-/// Return whether a line names the group with this index, itself or by a pattern, which may match the plain form of its name.
+/// Return whether a line names the group with this index, itself or by a pattern, which may match the plain form of its
+/// name.
 fn names<const D: usize>(on: &Located<String>, mesh: &Mesh<D>, place: usize) -> bool {
     let (any, group) = (on.value.replace(BODY, "*"), &mesh.groups[place].name);
-    match is_pattern(&any) {
-        true => Pattern::new(&any).is_ok_and(|pattern| pattern.matches(group) || pattern.matches(&plain(group))),
-        false => mesh.groups.place(&any) == Some(place),
+    if is_pattern(&any) {
+        Pattern::new(&any).is_ok_and(|pattern| pattern.matches(group) || pattern.matches(&plain(group)))
+    } else {
+        mesh.groups.place(&any) == Some(place)
     }
 }
 

@@ -1,5 +1,5 @@
-//! A whole body on the first rank, before its matrix is assembled: its contact rows, its loads, the rigid motions that supports leave, and that
-//! by which they move it.
+//! A whole body on the first rank, before its matrix is assembled: its contact rows, its loads, the rigid motions that
+//! supports leave, and that by which they move it.
 
 use super::approach;
 use super::bodies::SceneBody;
@@ -12,8 +12,8 @@ use crate::model::{Motion, Segment, Sprung, rigid::combined};
 use nalgebra::{DMatrix, DVector};
 use std::collections::HashSet;
 
-/// Share of the largest possible work below which the work of the loads is rounding: the sum of a million works, each rounded by 1e-16 of it, is rounded by 1e-10
-/// at most.
+/// Share of the largest possible work below which the work of the loads is rounding: the sum of a million works, each
+/// rounded by 1e-16 of it, is rounded by 1e-10 at most.
 pub const NO_WORK: f64 = 1e-9;
 
 /// A whole body before its matrix is assembled.
@@ -124,9 +124,10 @@ impl<'a, const D: usize> WholeBody<'a, D> {
         let unsupported = mesh.unsupported(&self.rigid_modes);
         let (springs, scale) =
             (mesh.ground_stiffness(&unsupported), mesh.ground_stiffness(&self.rigid_modes).diagonal().max());
-        let left = match scale > 0.0 && !unsupported.is_empty() {
-            true => Blocks::free(&springs, scale, TOLERANCE).iter().map(|w| rigid::combine(&unsupported, w)).collect(),
-            false => unsupported.clone(),
+        let left = if scale > 0.0 && !unsupported.is_empty() {
+            Blocks::free(&springs, scale, TOLERANCE).iter().map(|w| rigid::combine(&unsupported, w)).collect()
+        } else {
+            unsupported.clone()
         };
         let is_sprung = left.len() < unsupported.len();
         self.sprung = is_sprung.then(|| Sprung { motions: self.with_works(&unsupported), stiffness: springs });
@@ -134,8 +135,9 @@ impl<'a, const D: usize> WholeBody<'a, D> {
         (self.part.mesh.unconstrained_modes, self.part.mesh.unsupported_modes) = (left, unsupported);
     }
 
-    /// Return the dof at which a motion can be fixed, and its displacement there. It is the one that the motion moves most, the last one of equal ones, outside the
-    /// contact rows so that these do not change. The result is `None` if that displacement is rounding.
+    /// Return the dof at which a motion can be fixed, and its displacement there. It is the one that the motion moves
+    /// most, the last one of equal ones, outside the contact rows so that these do not change. The result is `None` if
+    /// that displacement is rounding.
     pub fn candidate(&self, motion: &RigidMotion<D>) -> Option<(usize, f64)> {
         let in_rows: HashSet<usize> = self.part.mesh.rows.col.iter().map(|&dof| dof as usize).collect();
         let is_free = |dof: &usize| !in_rows.contains(dof) && !self.part.mesh.held.prescribed.contains_key(dof);

@@ -1,15 +1,16 @@
 //! The errors of the forces of pairs, the sums of their pressures.
 //!
-//! Let z be the displacements under the loads B' omega kappa 1 at the points of a pair, its *influence*: the change of the force F under a load r is z'r. The
-//! pressure of the response is y = kappa (1 - B z), which is zero where the bodies follow. With the error e of the displacements, the pressures p_h of
-//! the discrete problem and p(c_h) of the law at the compression of the discrete displacements,
+//! Let z be the displacements under the loads B' omega kappa 1 at the points of a pair, its *influence*: the change of
+//! the force F under a load r is z'r. The pressure of the response is y = kappa (1 - B z), which is zero where the
+//! bodies follow. With the error e of the displacements, the pressures p_h of the discrete problem and p(c_h) of the
+//! law at the compression of the discrete displacements,
 //!
 //! ```text
 //! F - F_h = sum over cells of a(e, z - z_h) + sum over facets of int (p(c_h) - p_h) (1 - n.z_h)
 //! ```
 //!
-//! since a displacement of the discrete space does no work on e but for the quadrature of the layer, which is the second sum. The first is of second order,
-//! as the square of an energy error.
+//! since a displacement of the discrete space does no work on e but for the quadrature of the layer, which is the
+//! second sum. The first is of second order, as the square of an energy error.
 
 use super::{RecoveredBodies, TOLERANCE, displacements, rigid_closing, softness, to_dofs};
 use crate::contact::FinePoint;
@@ -21,13 +22,13 @@ use crate::model::{Field, Layer, LinearStep, Model};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::PI;
 
-/// Uncertainty of each part of the sum above, as a share of it. Parts of both signs cancel, and their sum is known no better than to this share of their
-/// magnitudes. For 66 forces of blocks, brackets, press fits and rollers of orders 1 to 4, one estimate is below a third of the error with 0.4,
-/// and three are with 0.3.
+/// Uncertainty of each part of the sum above, as a share of it. Parts of both signs cancel, and their sum is known no
+/// better than to this share of their magnitudes. For 66 forces of blocks, brackets, press fits and rollers of orders 1
+/// to 4, one estimate is below a third of the error with 0.4, and three are with 0.3.
 const UNCERTAIN: f64 = 0.4;
 
-/// Number of pairs up to which each has its influence computed, by one more linear system. The error of a force among more pairs is bounded by the sum
-/// of the magnitudes of the errors of its pressures, which is of first order.
+/// Number of pairs up to which each has its influence computed, by one more linear system. The error of a force among
+/// more pairs is bounded by the sum of the magnitudes of the errors of its pressures, which is of first order.
 const MOST: usize = 32;
 
 /// The discrete solution with what is recovered from it.
@@ -39,7 +40,8 @@ pub(super) struct Solution<'a> {
     pub recovered: &'a RecoveredBodies<'a>,
 }
 
-/// Return the relative errors of the forces of all pairs. `pressure_error` is the error of the pressures, n. Collective.
+/// Return the relative errors of the forces of all pairs. `pressure_error` is the error of the pressures, n.
+/// Collective.
 ///
 /// # Errors
 /// Failures of the solver library.
@@ -103,8 +105,9 @@ struct Influence {
 impl Influence {
     /// Solve for the influence on the force of pair number `pair`. Collective.
     ///
-    /// A rigid part under a given force has no stiffness, and its motions N are not in K. With the amounts a that leave the least of 1 - N a, measured by omega kappa,
-    /// the loads B' omega kappa (1 - N a) do no work on them, and the response with the motion a is z.
+    /// A rigid part under a given force has no stiffness, and its motions N are not in K. With the amounts a that leave
+    /// the least of 1 - N a, measured by omega kappa, the loads B' omega kappa (1 - N a) do no work on them, and the
+    /// response with the motion a is z.
     fn of(
         meshes: &dyn Meshes,
         model: &mut Model,
@@ -146,9 +149,10 @@ impl Influence {
 
     /// Return the sum over facets. Collective.
     ///
-    /// Compressions of the nodes are those of the discrete problem, and between them a stiff law answers the rest of the displacements with any pressure. The
-    /// bodies give way to a pressure that varies within a facet: with their compliance s the pressure is where the law meets the line
-    /// c_h - s (p - p_i) through the interpolated pressure p_i.
+    /// Compressions of the nodes are those of the discrete problem, and between them a stiff law answers the rest of
+    /// the displacements with any pressure. The bodies give way to a pressure that varies within a facet: with their
+    /// compliance s the pressure is where the law meets the line c_h - s (p - p_i) through the interpolated pressure
+    /// p_i.
     fn of_facets(&self, meshes: &dyn Meshes, model: &Model, solution: &Solution) -> Parts {
         let (pair, points) = (&model.pairs[self.pair], meshes.points(self.pair));
         let (pressure, soft) = (&solution.layer.pressure[model.range(self.pair)], softness(model, self.pair));
@@ -175,7 +179,8 @@ impl Influence {
     }
 }
 
-/// Return 1 - N a at the points of a pair, with the motions N of its rigid part and the amounts a for which it is least, measured by these springs.
+/// Return 1 - N a at the points of a pair, with the motions N of its rigid part and the amounts a for which it is
+/// least, measured by these springs.
 fn without_motions(model: &Model, pair: usize, springs: &[f64]) -> Vec<f64> {
     let of_pair = model.bodies.iter().filter(|slot| slot.is_rigid && slot.segments[0].pair == pair);
     let motions: Vec<&[f64]> = of_pair.flat_map(|slot| &slot.motions).map(|motion| &motion.trace[..]).collect();

@@ -1,9 +1,9 @@
-//! Rigid motions that only springs to the ground resist, where these springs carry next to nothing. They keep a body in place
-//! whose loads balance.
+//! Rigid motions that only springs to the ground resist, where these springs carry next to nothing. They keep a body in
+//! place whose loads balance.
 //!
-//! A spring of stiffness k carries what the mesh leaves of the balance of the loads, however soft the spring is. This force F
-//! moves the bodies by F/k and stores the energy F^2/k. Both grow without bound as k decreases, and so do their errors. They do
-//! not concern deformations and pressures, so neither the error nor the solution includes them.
+//! A spring of stiffness k carries what the mesh leaves of the balance of the loads, however soft the spring is. This
+//! force F moves the bodies by F/k and stores the energy F^2/k. Both grow without bound as k decreases, and so do their
+//! errors. They do not concern deformations and pressures, so neither the error nor the solution includes them.
 
 use crate::discretize::meshes::Meshes;
 use crate::linalg::dot;
@@ -11,10 +11,10 @@ use crate::model::rigid::Motions;
 use crate::model::{Layer, Model};
 use nalgebra::{DMatrix, DVector};
 
-/// Share of the work that the contact forces could do, up to which loads may work on a motion that springs only keep in place.
-/// What a coarse mesh leaves of the balance of loads is below this share. The benchmark is two rings in a press fit on springs of
-/// stiffness 1e-9 to 1. The estimated errors are 1.4e-2 in displacements and 0.106 in energy for every stiffness. With the
-/// motions on springs included, the estimates are 3.8e5 and 7.4.
+/// Share of the work that the contact forces could do, up to which loads may work on a motion that springs only keep in
+/// place. What a coarse mesh leaves of the balance of loads is below this share. The benchmark is two rings in a press
+/// fit on springs of stiffness 1e-9 to 1. The estimated errors are 1.4e-2 in displacements and 0.106 in energy for
+/// every stiffness. With the motions on springs included, the estimates are 3.8e5 and 7.4.
 const CARRIED: f64 = 1e-2;
 
 /// The motions n_k of all bodies that springs only keep in place, as amounts of the motions of each body.
@@ -27,8 +27,8 @@ pub struct HoldingSprings {
 }
 
 impl HoldingSprings {
-    /// Find the motions that neither the closed contacts of `layer` nor supports resist, and on which springs carry next to
-    /// nothing.
+    /// Find the motions that neither the closed contacts of `layer` nor supports resist, and on which springs carry
+    /// next to nothing.
     pub fn of(model: &Model, layer: &Layer) -> Self {
         let none = || Self { motions: Vec::new(), amounts: DVector::zeros(0), energy: 0.0 };
         if model.bodies.iter().all(|slot| slot.sprung.is_none()) {
@@ -61,8 +61,8 @@ impl HoldingSprings {
         }
     }
 
-    /// Balance the loads at all nodes of the bodies on these motions. `loads` is empty for bodies of other ranks. Each nodal
-    /// force changes in proportion to its magnitude. Collective.
+    /// Balance the loads at all nodes of the bodies on these motions. `loads` is empty for bodies of other ranks. Each
+    /// nodal force changes in proportion to its magnitude. Collective.
     ///
     /// The forces that the springs would carry then act on the bodies themselves, as in a solution without springs.
     pub fn balance(&self, meshes: &dyn Meshes, model: &Model, loads: &mut [Vec<f64>]) {

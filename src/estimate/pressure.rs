@@ -9,12 +9,13 @@ use std::collections::BTreeSet;
 use std::f64::consts::PI;
 use std::ops::Range;
 
-/// Factor on the errors of nodal values. Where a solution has a kink, recovery smooths it and underestimates the error. The same
-/// factor is usual for errors extrapolated from three meshes (Roache 1994). With it, most estimates on machine parts are 0.7 to 2
-/// times the true errors; without it they would be 0.56 to 1.6 times.
+/// Factor on the errors of nodal values. Where a solution has a kink, recovery smooths it and underestimates the error.
+/// The same factor is usual for errors extrapolated from three meshes (Roache 1994). With it, most estimates on machine
+/// parts are 0.7 to 2 times the true errors; without it they would be 0.56 to 1.6 times.
 pub(super) const SAFETY: f64 = 1.25;
 
-/// A reason why the estimated error of a pair's pressures is a guess, since the mesh does not show how they vary, and a place.
+/// A reason why the estimated error of a pair's pressures is a guess, since the mesh does not show how they vary, and a
+/// place.
 #[derive(Debug, Clone, Copy)]
 pub struct Guess {
     /// The reason.
@@ -26,19 +27,21 @@ pub struct Guess {
 /// The reasons for a guess.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Cause {
-    /// Most of the error is at an edge of the contact, where pressures may be singular. The place is that of the largest part.
+    /// Most of the error is at an edge of the contact, where pressures may be singular. The place is that of the
+    /// largest part.
     Rim,
-    /// Contact ends within the facets that carry most of the pressure, so that they do not show how it varies. The place is that of the peak.
+    /// Contact ends within the facets that carry most of the pressure, so that they do not show how it varies. The
+    /// place is that of the peak.
     FewFacets,
 }
 
-/// Relative error of the pressures below which an error at rims is no guess: a hundred times the default tolerance of the iteration, at
-/// which differences within a facet are those of an unfinished iteration.
+/// Relative error of the pressures below which an error at rims is no guess: a hundred times the default tolerance of
+/// the iteration, at which differences within a facet are those of an unfinished iteration.
 const UNFINISHED: f64 = 1e-6;
 
-/// Least share of the squared pressure that facets in contact as a whole carry where a mesh resolves the contact. With p^2 = 1 - r^2 of a contact of
-/// Hertz with the radius one, those within 1 - h carry 1 - (1 - (1 - h)^2)^2, a half for a radius of 2.2 facets. On machine parts,
-/// the estimates of contacts with less were 0.6 to 4.6 times the true error.
+/// Least share of the squared pressure that facets in contact as a whole carry where a mesh resolves the contact. With
+/// p^2 = 1 - r^2 of a contact of Hertz with the radius one, those within 1 - h carry 1 - (1 - (1 - h)^2)^2, a half for
+/// a radius of 2.2 facets. On machine parts, the estimates of contacts with less were 0.6 to 4.6 times the true error.
 const RESOLVED: f64 = 0.5;
 
 /// The errors of the pressures at the contact points.
@@ -58,9 +61,9 @@ pub(super) struct PressureErrors {
 impl PressureErrors {
     /// Compute the errors from those of the compression, n.
     ///
-    /// The response that gave these is that of springs at the closed points. So a point that opens or closes takes the resolvent of its law for
-    /// the state in the response, as in a step of Newton's method. This allows for the bodies, which give way to the pressure of a point
-    /// however stiff its layer is.
+    /// The response that gave these is that of springs at the closed points. So a point that opens or closes takes the
+    /// resolvent of its law for the state in the response, as in a step of Newton's method. This allows for the bodies,
+    /// which give way to the pressure of a point however stiff its layer is.
     pub fn new(meshes: &dyn Meshes, model: &Model, layer: &Layer, closing: &[f64]) -> Self {
         let compression: Vec<f64> = layer.compression.iter().zip(closing).map(|(c, more)| c + more).collect();
         let resolved = Layer::resolve(model, &compression, &layer.linear(&compression), &meeting_slopes(model), &[]);
@@ -105,14 +108,14 @@ impl PressureErrors {
 
 /// Return the sum of the compliances 1/E* of the bodies of a pair.
 ///
-/// Times the size of a facet over pi it is their compliance to a pressure that changes its sign within the facet. It is that of the springs of two
-/// half-spaces in series, for a wave as long as the facet.
+/// Times the size of a facet over pi it is their compliance to a pressure that changes its sign within the facet. It is
+/// that of the springs of two half-spaces in series, for a wave as long as the facet.
 pub fn softness(model: &Model, pair: usize) -> f64 {
     model.pairs[pair].bodies.iter().map(|&body| 1.0 / model.bodies[body].modulus).sum::<f64>()
 }
 
-/// Return the share of the squared pressure at integration points between contact points that are all under pressure, one if there is no pressure.
-/// `pressure` has the pressures of the pair's contact points.
+/// Return the share of the squared pressure at integration points between contact points that are all under pressure,
+/// one if there is no pressure. `pressure` has the pressures of the pair's contact points.
 fn share_of_whole_facets(points: &FinePoints, pressure: &[f64]) -> f64 {
     let (mut whole, mut all) = (0.0, 0.0);
     for (g, point) in points.each.iter().enumerate() {
@@ -128,14 +131,15 @@ fn share_of_whole_facets(points: &FinePoints, pressure: &[f64]) -> f64 {
 
 /// What the pressures of a pair may lack at its rims, where no smoother solution can be recovered.
 ///
-/// Without a layer, the pressure at the distance r from a rim is K r^(lambda - 1). Recovered polynomials are no nearer to it than the
-/// discrete pressure. A facet of size h at the rim misses the order h^(lambda - 1/2) of it in the mean square, whatever the degree of its
-/// polynomials. So the part of the highest degree, that is, p_h less its projection p_- on polynomials of one degree less, has the order of
-/// the error. [`missed`] is the ratio of the error to this part.
+/// Without a layer, the pressure at the distance r from a rim is K r^(lambda - 1). Recovered polynomials are no nearer
+/// to it than the discrete pressure. A facet of size h at the rim misses the order h^(lambda - 1/2) of it in the mean
+/// square, whatever the degree of its polynomials. So the part of the highest degree, that is, p_h less its projection
+/// p_- on polynomials of one degree less, has the order of the error. [`missed`] is the ratio of the error to this
+/// part.
 ///
-/// A layer limits the pressure. A pressure that is missed by q changes the deflection of the bodies by s q, with their compliance s to a
-/// pressure that varies within the facet, and the law with the tangent stiffness kappa then changes the pressure by
-/// s kappa/(1 + s kappa) q.
+/// A layer limits the pressure. A pressure that is missed by q changes the deflection of the bodies by s q, with their
+/// compliance s to a pressure that varies within the facet, and the law with the tangent stiffness kappa then changes
+/// the pressure by s kappa/(1 + s kappa) q.
 #[derive(Default)]
 struct RimError {
     /// Integral of the squared error over all facets at rims.
@@ -145,7 +149,8 @@ struct RimError {
 }
 
 impl RimError {
-    /// Compute the error of a pair from the pressures and tangents of its contact points. `soft` is the [`softness`] of its bodies.
+    /// Compute the error of a pair from the pressures and tangents of its contact points. `soft` is the [`softness`] of
+    /// its bodies.
     fn new(points: &FinePoints, soft: f64, pressure: &[f64], tangent: &[f64]) -> Self {
         let (mut error, mut largest, mut first) = (Self::default(), 0.0, 0);
         for chunk in points.each.chunk_by(|p, q| p.facet == q.facet) {
@@ -172,12 +177,13 @@ impl RimError {
 
 /// Return the ratio of the error to the part of the highest degree of a pressure on a facet of side a.
 ///
-/// Stresses of elements of degree 2 have the degree 1. Let lambda be 0.774, the rim of a punch with right angles on a block of the same material.
-/// By its coefficients in Legendre polynomials, r^(lambda - 1) less the nearest line is 1.69 times its part of degree 2, which pressures of degree 2
-/// show, and 0.97 times its part of degree 1, which linear pressures show. For elements of degree k the ratio is the root of 1 + k/1.08 by the same rule, from k = 2
-/// to 8 within one per cent. For linear elements the ratio would be 1.39 by the same rule. Their
-/// nodal pressures are means over two facets, which flattens the rise: on such a punch with 3, 6 and 12 elements a unit of length under a layer of 1e6
-/// the measured ratio is 2.8, 2.5 and 2.2.
+/// Stresses of elements of degree 2 have the degree 1. Let lambda be 0.774, the rim of a punch with right angles on a
+/// block of the same material. By its coefficients in Legendre polynomials, r^(lambda - 1) less the nearest line is
+/// 1.69 times its part of degree 2, which pressures of degree 2 show, and 0.97 times its part of degree 1, which linear
+/// pressures show. For elements of degree k the ratio is the root of 1 + k/1.08 by the same rule, from k = 2 to 8
+/// within one per cent. For linear elements the ratio would be 1.39 by the same rule. Their nodal pressures are means
+/// over two facets, which flattens the rise: on such a punch with 3, 6 and 12 elements a unit of length under a layer
+/// of 1e6 the measured ratio is 2.8, 2.5 and 2.2.
 fn missed(order: Order, degree: usize) -> f64 {
     match (order, degree) {
         (Order::P1, _) => 2.8,
@@ -186,8 +192,8 @@ fn missed(order: Order, degree: usize) -> f64 {
     }
 }
 
-/// Return the part of the highest degree of the pressure at each integration point of a facet. `pressure` has the pressures of the contact
-/// points.
+/// Return the part of the highest degree of the pressure at each integration point of a facet. `pressure` has the
+/// pressures of the contact points.
 fn highest_part(points: &FinePoints, on_facet: Range<usize>, pressure: &[f64]) -> Vec<f64> {
     let each = &points.each[on_facet.clone()];
     let mean = |p: &[f64], q: &[f64]| each.iter().zip(p.iter().zip(q)).map(|(g, (p, q))| g.weight * p * q).sum::<f64>();
@@ -213,17 +219,19 @@ fn highest_part(points: &FinePoints, on_facet: Range<usize>, pressure: &[f64]) -
 pub(super) struct LayerError {
     /// Squared energy error of the layer.
     pub energy: f64,
-    /// Estimated pressure at each integration point. It is the pressure of the discrete problem where the estimate is no better.
+    /// Estimated pressure at each integration point. It is the pressure of the discrete problem where the estimate is
+    /// no better.
     pub pressure: Vec<f64>,
 }
 
 impl LayerError {
-    /// Compute the error of a pair with contact points `range`. `giving` is the closing of the recovered displacements of both
-    /// bodies at each integration point. `beyond` is what the compression of each contact point lacks as a mean.
+    /// Compute the error of a pair with contact points `range`. `giving` is the closing of the recovered displacements
+    /// of both bodies at each integration point. `beyond` is what the compression of each contact point lacks as a
+    /// mean.
     ///
-    /// The recovered displacements belong to the interpolated pressure p_i of the contact points, and close the gap to the
-    /// compression c*. Let s be the compliance of the bodies to a pressure that varies within a facet. A pressure p then leaves
-    /// the compression c* - s (p - p_i), and the intersection of this line with the law is the estimate.
+    /// The recovered displacements belong to the interpolated pressure p_i of the contact points, and close the gap to
+    /// the compression c*. Let s be the compliance of the bodies to a pressure that varies within a facet. A pressure p
+    /// then leaves the compression c* - s (p - p_i), and the intersection of this line with the law is the estimate.
     pub fn new(
         pair: &ContactPair,
         points: &FinePoints,
@@ -243,8 +251,8 @@ impl LayerError {
             let (compliance, nearest) = (point.size * soft / PI, point.nearest);
             let carriers = || points.interpolation.row(g);
             let is_whole = is_bonded || carriers().all(|(q, _)| compression[q] >= 0.0);
-            // A curve through points of which some are open may rise above all of them, the more the faster the gap grows. No
-            // pressure follows from such a rise.
+            // A curve through points of which some are open may rise above all of them, the more the faster the gap
+            // grows. No pressure follows from such a rise.
             let between = |value: &dyn Fn(usize) -> f64| {
                 let curve: f64 = carriers().map(|(q, share)| share * value(q)).sum();
                 let largest = || carriers().map(|(q, _)| value(q)).fold(f64::NEG_INFINITY, f64::max);
@@ -279,12 +287,12 @@ impl LayerError {
 
 /// Return the weight of the law's pressure relative to that of the discrete problem.
 ///
-/// Let e be the error of displacements and s the compliance. The pressure of the law has the error `stiffness` times e/s. The
-/// discrete pressure is a sum of values with errors of e/s each, so its error is the root of `amplified` times e/s. The mean of
-/// both with the least variance has weights in proportion to one over their squares.
+/// Let e be the error of displacements and s the compliance. The pressure of the law has the error `stiffness` times
+/// e/s. The discrete pressure is a sum of values with errors of e/s each, so its error is the root of `amplified` times
+/// e/s. The mean of both with the least variance has weights in proportion to one over their squares.
 ///
-/// In a facet whose points are all closed, the error of the law is kappa e, since p_i is wrong together with c*. Elsewhere it is
-/// e/(s + 1/kappa). Here kappa is the tangent stiffness of the law.
+/// In a facet whose points are all closed, the error of the law is kappa e, since p_i is wrong together with c*.
+/// Elsewhere it is e/(s + 1/kappa). Here kappa is the tangent stiffness of the law.
 fn weight_of_law(stiffness: f64, amplified: f64) -> f64 {
     amplified / (amplified + stiffness * stiffness)
 }

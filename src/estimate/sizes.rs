@@ -7,8 +7,8 @@
 //! cover    the boundary gets a layer of cells outside, as thick as facets may lie below a curved boundary
 //! ```
 //!
-//! The field is defined on the straight cells of the old mesh. The mesher evaluates it at points of the true boundary, which lies
-//! partly outside these cells. A field gives no size where it has no cell.
+//! The field is defined on the straight cells of the old mesh. The mesher evaluates it at points of the true boundary,
+//! which lies partly outside these cells. A field gives no size where it has no cell.
 
 use super::Estimate;
 use crate::contact::ContactPair;
@@ -45,15 +45,17 @@ struct Grading {
     is_steep: bool,
 }
 
-/// The grading of orders one and two. Errors of a mesh predict those of cells a few times smaller, but not of cells an order of magnitude smaller. With 0.08
-/// instead of 0.25, `groove-held` to 1e-3 and `hertz-sphere` to 2e-2 took the same number of meshes, the last ones of the same size within 7 %. With
-/// a growth of 1 and 2 these had the same size within 5 %; with 0.5 the worst cells of the meshes of both flanges are as good as those of the scripts' own
-/// meshes (mean ratio 0.31 to 0.38 at least).
+/// The grading of orders one and two. Errors of a mesh predict those of cells a few times smaller, but not of cells an
+/// order of magnitude smaller. With 0.08 instead of 0.25, `groove-held` to 1e-3 and `hertz-sphere` to 2e-2 took the
+/// same number of meshes, the last ones of the same size within 7 %. With a growth of 1 and 2 these had the same size
+/// within 5 %; with 0.5 the worst cells of the meshes of both flanges are as good as those of the scripts' own meshes
+/// (mean ratio 0.31 to 0.38 at least).
 const EVEN: Grading = Grading { range: [0.25, 2.0], growth: 0.5, is_steep: false };
 
-/// The grading of orders above two, whose cells far from singular places become larger while the others become smaller. With 0.15 and 0.35 instead of 0.25,
-/// adaptations of `groove-held` to 1e-6 with orders 4 and 6 take 1.24 and 1.17 times the dofs, all meshes together. Between the distances r and e r
-/// from a point there are about 2 pi/g^2 cells of the size g r: a growth g of 1 takes a quarter of the cells that one of 0.5 takes.
+/// The grading of orders above two, whose cells far from singular places become larger while the others become smaller.
+/// With 0.15 and 0.35 instead of 0.25, adaptations of `groove-held` to 1e-6 with orders 4 and 6 take 1.24 and 1.17
+/// times the dofs, all meshes together. Between the distances r and e r from a point there are about 2 pi/g^2 cells of
+/// the size g r: a growth g of 1 takes a quarter of the cells that one of 0.5 takes.
 const STEEP: Grading = Grading { range: [0.25, 4.0], growth: 1.0, is_steep: true };
 
 /// Return the grading of a body.
@@ -74,9 +76,10 @@ pub struct Aim {
 
 /// Return the sizes of the mesh with the fewest cells that meets an aim. Collective.
 ///
-/// Let p be the rate of a cell, which is the degree of its elements where the solution is smooth, and D the dimension. With h -> s h the squared error eta^2
-/// of a cell becomes s^(2p) eta^2, and s^-D cells take its place. The number of cells is least where s^(2p + D) eta^2 is the same everywhere. Every cell of
-/// the new mesh then has nearly the same error.
+/// Let p be the rate of a cell, which is the degree of its elements where the solution is smooth, and D the dimension.
+/// With h -> s h the squared error eta^2 of a cell becomes s^(2p) eta^2, and s^-D cells take its place. The number of
+/// cells is least where s^(2p + D) eta^2 is the same everywhere. Every cell of the new mesh then has nearly the same
+/// error.
 pub fn wanted(meshes: &dyn Meshes, model: &Model, layer: &Layer, estimate: &Estimate, aim: Aim) -> Sizes {
     let Aim { share, more, most } = aim;
     let bodies = model.meshed();
@@ -120,7 +123,8 @@ pub fn wanted(meshes: &dyn Meshes, model: &Model, layer: &Layer, estimate: &Esti
     Sizes { vertices: singular_places(meshes, model, layer), ..sizes }
 }
 
-/// Return where contacts end and gaps have kinks on edges of order three or more, whose polynomials converge fast only beside these places.
+/// Return where contacts end and gaps have kinks on edges of order three or more, whose polynomials converge fast only
+/// beside these places.
 fn singular_places(meshes: &dyn Meshes, model: &Model, layer: &Layer) -> Vec<[f64; 3]> {
     let mut places = Vec::new();
     for (index, pair) in model.pairs.iter().enumerate() {
@@ -197,10 +201,12 @@ struct CellError {
 }
 
 impl CellError {
-    /// Return the part of the error in pressures and displacements of the contact, whose `distance` is in sizes of the cell.
+    /// Return the part of the error in pressures and displacements of the contact, whose `distance` is in sizes of the
+    /// cell.
     ///
-    /// A cell of size h changes these by a(e, z - I z), where z is the response to a load on the contact. At the distance r from it z changes over lengths of r,
-    /// so that the error z - I z of its interpolant is less by (h/r)^p than beside the contact. For order two and less the whole error counts.
+    /// A cell of size h changes these by a(e, z - I z), where z is the response to a load on the contact. At the
+    /// distance r from it z changes over lengths of r, so that the error z - I z of its interpolant is less by (h/r)^p
+    /// than beside the contact. For order two and less the whole error counts.
     fn of_contact(self, distance: f64) -> Self {
         if !self.grading.is_steep || distance <= 1.0 {
             return self;
@@ -215,8 +221,9 @@ impl CellError {
         free.clamp(least, most)
     }
 
-    /// Return the squared error that remains with a ratio of sizes. Elements of high order leave most of their error in the few cells at singular places,
-    /// which the smallest ratio does not bring down to that of the others: the next meshes do, and smooth cells are not to make up for it.
+    /// Return the squared error that remains with a ratio of sizes. Elements of high order leave most of their error in
+    /// the few cells at singular places, which the smallest ratio does not bring down to that of the others: the next
+    /// meshes do, and smooth cells are not to make up for it.
     fn left(&self, ratio: f64) -> f64 {
         if self.grading.is_steep && ratio <= self.grading.range[0] {
             0.0
@@ -226,8 +233,8 @@ impl CellError {
     }
 }
 
-/// Return the sizes of the meshes, but none below a smallest size. With this size everywhere the bodies together would have about
-/// this number of `cells`.
+/// Return the sizes of the meshes, but none below a smallest size. With this size everywhere the bodies together would
+/// have about this number of `cells`.
 pub fn coarse(meshes: &dyn Meshes, bodies: usize, cells: usize) -> Sizes {
     let power = meshes.cells(0).stride as f64 - 1.0;
     let volume: f64 = (0..bodies).flat_map(|body| meshes.cells(body).sizes).map(|size| size.powf(power)).sum::<f64>();
@@ -265,8 +272,8 @@ fn touching(meshes: &dyn Meshes, model: &Model, layer: &Layer) -> Vec<Touching> 
 
 /// Give surfaces the smaller of their two sizes where they touch.
 ///
-/// A stiff body has hardly any error of its own. Its coarse facets would still make the gap of the surface, and the means over them, inexact
-/// for a soft partner.
+/// A stiff body has hardly any error of its own. Its coarse facets would still make the gap of the surface, and the
+/// means over them, inexact for a soft partner.
 fn join(bodies: &[BodyCells], sizes: &mut [Vec<f64>], touching: &[Touching]) {
     let size = |point: &Touching, side: usize| -> f64 {
         point.vertices[side].iter().map(|&(node, l)| l * sizes[point.bodies[side]][node as usize]).sum()
@@ -304,8 +311,8 @@ impl MeanSize {
     }
 }
 
-/// Return the field of the sizes that `wanted` returns for each cell. Its arguments are the index of the cell, counted over all
-/// bodies, and the present size of the cell. Surfaces get one size at the points where they are `touching`.
+/// Return the field of the sizes that `wanted` returns for each cell. Its arguments are the index of the cell, counted
+/// over all bodies, and the present size of the cell. Surfaces get one size at the points where they are `touching`.
 fn gather(meshes: &dyn Meshes, counts: &[usize], touching: &[Touching], wanted: impl Fn(usize, f64) -> f64) -> Sizes {
     let bodies: Vec<BodyCells> = (0..counts.len()).map(|body| meshes.cells(body)).collect();
     let (mut first, mut sizes) = (0, Vec::new());
@@ -355,12 +362,12 @@ impl Sizes {
     }
 }
 
-/// Largest angle in radians between neighbouring facets of a smooth boundary. It belongs to 12 facets on a circle, whose chords
-/// miss 1 % of its area. Gmsh's manual uses as many for `Mesh.MeshSizeFromCurvature`.
+/// Largest angle in radians between neighbouring facets of a smooth boundary. It belongs to 12 facets on a circle,
+/// whose chords miss 1 % of its area. Gmsh's manual uses as many for `Mesh.MeshSizeFromCurvature`.
 const TURN: f64 = std::f64::consts::PI / 6.0;
 
-/// Angle in radians, 60 degrees, above which neighbouring facets meet at an edge of the part. The facets of a circle of six
-/// chords differ by this angle. Gmsh divides a circle into seven or more by default (`Mesh.MinimumCirclePoints`).
+/// Angle in radians, 60 degrees, above which neighbouring facets meet at an edge of the part. The facets of a circle of
+/// six chords differ by this angle. Gmsh divides a circle into seven or more by default (`Mesh.MinimumCirclePoints`).
 const EDGE: f64 = std::f64::consts::FRAC_PI_3;
 
 /// Limit the sizes at the nodes of a body, one for each node, and grade them.
@@ -415,8 +422,8 @@ fn pairs(cells: &BodyCells) -> (Vec<FacetPair>, Vec<[f64; 3]>) {
 
 /// Return the limits of the sizes at nodes of curved boundaries.
 ///
-/// The mean square of the curvatures across the edges of a facet is 3/8 of the squared curvature of a cylinder, and all of that
-/// of a sphere. With twice the mean square, both curvatures are met within a fifth.
+/// The mean square of the curvatures across the edges of a facet is 3/8 of the squared curvature of a cylinder, and all
+/// of that of a sphere. With twice the mean square, both curvatures are met within a fifth.
 fn limits(cells: &BodyCells) -> Vec<(u32, f64)> {
     let dimension = cells.stride - 1;
     let mut sums = vec![[0.0; 2]; cells.facets.len() / dimension];
@@ -438,8 +445,8 @@ fn limits(cells: &BodyCells) -> Vec<(u32, f64)> {
     limits
 }
 
-/// Reduce the sizes to the largest ones whose differences along edges are at most `growth` times the length. This is Dijkstra's
-/// algorithm from the smallest size.
+/// Reduce the sizes to the largest ones whose differences along edges are at most `growth` times the length. This is
+/// Dijkstra's algorithm from the smallest size.
 fn grade(cells: &BodyCells, sizes: &mut [f64], growth: f64) {
     let mut beside: Vec<Vec<u32>> = vec![Vec::new(); cells.nodes.len()];
     for cell in cells.corners.chunks_exact(cells.stride) {
@@ -468,9 +475,10 @@ fn grade(cells: &BodyCells, sizes: &mut [f64], growth: f64) {
 
 /// Return the corners of the simplices outside of facets on a curved boundary, with their sizes.
 ///
-/// Let h be the length of a chord, t the angle by which neighbouring facets turn, and R the radius of a sphere. A chord lies h
-/// t/8 below the boundary. The centre of a triangle with edges h on the sphere lies h^2/(6 R) = 0.29 h t below it, where t =
-/// h/(sqrt(3) R). The layer is h t/2 thick, since nodes beside an edge of the part move out at 45 degrees.
+/// Let h be the length of a chord, t the angle by which neighbouring facets turn, and R the radius of a sphere. A chord
+/// lies h t/8 below the boundary. The centre of a triangle with edges h on the sphere lies h^2/(6 R) = 0.29 h t below
+/// it, where t = h/(sqrt(3) R). The layer is h t/2 thick, since nodes beside an edge of the part move out at 45
+/// degrees.
 fn layer(cells: &BodyCells, sizes: &[f64]) -> Vec<([f64; 3], f64)> {
     let dimension = cells.stride - 1;
     let (pairs, normals) = pairs(cells);
@@ -500,8 +508,8 @@ fn layer(cells: &BodyCells, sizes: &[f64]) -> Vec<([f64; 3], f64)> {
         nodes.sort_unstable();
         let prism: Vec<_> = nodes.iter().map(|&node| (cells.nodes[node as usize], sizes[node as usize])).collect();
         let roof: Vec<_> = nodes.iter().map(|&node| (lifted(node), sizes[node as usize])).collect();
-        // The prism between floor and roof is divided into simplices. Each has the floor up to one node and the roof from this
-        // node on.
+        // The prism between floor and roof is divided into simplices. Each has the floor up to one node and the roof
+        // from this node on.
         for at in 0..dimension {
             simplices.extend_from_slice(&prism[..=at]);
             simplices.extend_from_slice(&roof[at..]);
@@ -510,8 +518,8 @@ fn layer(cells: &BodyCells, sizes: &[f64]) -> Vec<([f64; 3], f64)> {
     simplices
 }
 
-/// Angle in radians up to which neighbouring facets belong to a plane. Rounding of coordinates turns facets of a plane by 1e-12
-/// at most. A circle of 10^6 facets turns by 6e-6.
+/// Angle in radians up to which neighbouring facets belong to a plane. Rounding of coordinates turns facets of a plane
+/// by 1e-12 at most. A circle of 10^6 facets turns by 6e-6.
 const FLAT: f64 = 1e-6;
 
 /// Return the outer unit normal of a facet from its corners, whose order gives the orientation.
@@ -561,7 +569,8 @@ mod tests {
         BodyCells { nodes, stride: 3, corners, facets, sizes: vec![1.0; chords as usize] }
     }
 
-    /// Return the faces of an octahedron, each in 16 parts, moved onto the sphere of radius 2, with cells to the centre.
+    /// Return the faces of an octahedron, each in 16 parts, moved onto the sphere of radius 2, with cells to the
+    /// centre.
     fn ball() -> BodyCells {
         let (mut nodes, mut facets) = (vec![[0.0; 3]], Vec::new());
         let mut number = HashMap::new();

@@ -1,6 +1,7 @@
 //! The parser of expressions: tokens, operator precedence, function calls, and refusals with their place.
 //!
-//! Steps are written in postfix order while the tokens are read, so that the cost is proportional to the length of the text.
+//! Steps are written in postfix order while the tokens are read, so that the cost is proportional to the length of the
+//! text.
 
 use super::program::{self, BINARY, Binary, COMPARISON, INFIX, Number, Operation, POWER, SIGN, SIGNS, UNARY, Unary};
 use crate::data::{Data, Library};
@@ -227,7 +228,8 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Return the refusal of a value that follows another without an operator. After a number it may be meant as a unit.
+    /// Return the refusal of a value that follows another without an operator. After a number it may be meant as a
+    /// unit.
     fn missing_operator(&self) -> Error {
         let found = &self.text.text[self.span.clone()];
         let is_after_number =
@@ -350,7 +352,8 @@ pub(super) struct Text<'a> {
 }
 
 impl Text<'_> {
-    /// Return a refusal of some of its bytes. The caret is inside the string if the source has the text verbatim, without escapes.
+    /// Return a refusal of some of its bytes. The caret is inside the string if the source has the text verbatim,
+    /// without escapes.
     pub fn refuse(&self, span: Range<usize>, message: impl Into<String>) -> Error {
         let Place { source, span: whole } = self.place;
         let written = source.text.get(whole.clone()).unwrap_or_default();

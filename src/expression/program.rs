@@ -1,8 +1,8 @@
-//! Expressions as programs for a stack of numbers, with their operators and exact derivatives. The evaluation is a loop over steps, however
-//! long or deep the text is.
+//! Expressions as programs for a stack of numbers, with their operators and exact derivatives. The evaluation is a loop
+//! over steps, however long or deep the text is.
 //!
-//! Truth is a number: comparisons give 1 or 0, and a number > 0 is true. Operators and functions keep a NaN, so that a value outside the
-//! domain of a function can be refused where it is used.
+//! Truth is a number: comparisons give 1 or 0, and a number > 0 is true. Operators and functions keep a NaN, so that a
+//! value outside the domain of a function can be refused where it is used.
 
 use crate::data::Data;
 use crate::linalg::portable;
@@ -189,7 +189,8 @@ pub(super) struct Dual {
     pub slope: f64,
 }
 
-/// Return the derivative of a function times the slope of its argument. It is zero for a constant argument, even if the derivative is infinite.
+/// Return the derivative of a function times the slope of its argument. It is zero for a constant argument, even if the
+/// derivative is infinite.
 fn times(derivative: f64, slope: f64) -> f64 {
     if slope == 0.0 { 0.0 } else { derivative * slope }
 }
@@ -255,7 +256,8 @@ pub(super) struct Binary {
 /// A function of two values.
 #[derive(Debug)]
 pub(super) enum Two {
-    /// A differentiable function. The second function returns its derivatives by both arguments, from the arguments and the value.
+    /// A differentiable function. The second function returns its derivatives by both arguments, from the arguments and
+    /// the value.
     Smooth(fn(f64, f64) -> f64, fn(f64, f64, f64) -> [f64; 2]),
     /// A function whose value is a truth.
     Truth(fn(f64, f64) -> f64),
@@ -296,7 +298,8 @@ pub(super) static UNARY: [Unary; 17] = [
 /// The signs, which stand before a value.
 pub(super) static SIGNS: [Unary; 2] = [smooth("-", |a| -a, |_, _| -1.0), steps("!", |a| compare(a, a, a <= 0.0))];
 
-/// Functions of two values. `min` and `max` take more values, one after another, and unlike those of `f64` they keep a NaN.
+/// Functions of two values. `min` and `max` take more values, one after another, and unlike those of `f64` they keep a
+/// NaN.
 pub(super) static BINARY: [Binary; 3] = [
     two("atan2", Two::Smooth(portable::atan2, |a, b, _| [b, -a].map(|x| x / (a * a + b * b)))),
     two("max", Two::Pick(|a, b| a.is_nan() || a > b)),

@@ -80,7 +80,8 @@ fn precedence_is_the_usual_one() {
     }
 }
 
-/// Random trees, written with parentheses only where the grammar needs them, have the value of the tree: a test of grammar and program.
+/// Random trees, written with parentheses only where the grammar needs them, have the value of the tree: a test of
+/// grammar and program.
 #[test]
 fn random_expressions_have_their_value() {
     let mut state = 7_u64;
@@ -101,9 +102,8 @@ fn random(state: &mut u64, depth: usize, point: [f64; 4]) -> (String, f64, u8) {
     };
     let kind = if depth == 0 { draw(2) } else { draw(9) };
     let choice = draw(5) as usize;
-    let within = |(text, value, power): (String, f64, u8), least: u8| match power < least {
-        true => (format!("({text})"), value),
-        false => (text, value),
+    let within = |(text, value, power): (String, f64, u8), least: u8| {
+        if power < least { (format!("({text})"), value) } else { (text, value) }
     };
     match kind {
         0 => (["1", "2.5", "1e-1", ".5", "3"][choice].into(), [1.0, 2.5, 0.1, 0.5, 3.0][choice], 9),

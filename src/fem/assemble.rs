@@ -1,7 +1,8 @@
-//! The linear system of a body: stiffness matrix and loads by direct scatter into compressed rows, and the elimination of supports.
+//! The linear system of a body: stiffness matrix and loads by direct scatter into compressed rows, and the elimination
+//! of supports.
 //!
-//! The pattern is built once from the node graph, which holds the couplings through cells and through contact rows. Positions
-//! of entries follow from the graph by arithmetic, so that assembly adds each value directly to its entry.
+//! The pattern is built once from the node graph, which holds the couplings through cells and through contact rows.
+//! Positions of entries follow from the graph by arithmetic, so that assembly adds each value directly to its entry.
 
 use super::elasticity::{Elasticity, Flaw, Material};
 use super::element::{self, Rule};
@@ -34,15 +35,13 @@ impl NodeGraph {
         Self::new(space, &coupled.filter(|nodes| nodes.len() > 1).collect::<Vec<_>>(), frame)
     }
 
-    /// Build the graph of a space's cells plus `extra` sets of nodes that are coupled among themselves. These are the nodes of
-    /// each contact row, the pattern of B'B. The nodes that `frame` ties are represented by those that move them. Their own rows have the
-    /// diagonal alone.
+    /// Build the graph of a space's cells plus `extra` sets of nodes that are coupled among themselves. These are the
+    /// nodes of each contact row, the pattern of B'B. The nodes that `frame` ties are represented by those that move
+    /// them. Their own rows have the diagonal alone.
     pub fn new<const D: usize>(space: &Space<D>, extra: &[Vec<u32>], frame: &Frame<D>) -> Self {
         let n = space.nodes.len();
-        let merged: Vec<u32> = match frame.is_empty() {
-            true => Vec::new(),
-            false => space.cells.iter().map(|&node| frame.node(node)).collect(),
-        };
+        let merged: Vec<u32> =
+            if frame.is_empty() { Vec::new() } else { space.cells.iter().map(|&node| frame.node(node)).collect() };
         let cells = if merged.is_empty() { &space.cells } else { &merged };
         let constrained: Vec<Vec<u32>> =
             constrained_cells(space, frame).chain(frame.tied().map(|node| vec![node])).collect();
@@ -114,8 +113,8 @@ impl NodeGraph {
         Csr { columns: D * n, ptr, values: vec![0.0; col.len()], col }
     }
 
-    /// Add a block k of nodal stiffness between two nodes to a matrix on this graph, as C'k C in the rows and columns of the dofs that move them.
-    /// Rows that the graph lacks are left out.
+    /// Add a block k of nodal stiffness between two nodes to a matrix on this graph, as C'k C in the rows and columns
+    /// of the dofs that move them. Rows that the graph lacks are left out.
     fn add_moved<const D: usize>(&self, [a, b]: [&Node<D>; 2], k: SMatrix<f64, D, D>, matrix: &mut Csr) {
         let no_columns = |i: u32, k: SMatrix<f64, D, D>, matrix: &mut Csr| {
             if !self.has(i) {
@@ -173,7 +172,8 @@ fn constrained_cells<'a, const D: usize>(
     })
 }
 
-/// Invert a list of sets of nodes below `n`. Return row starts, n + 1 entries, and the indices of the sets that contain each node.
+/// Invert a list of sets of nodes below `n`. Return row starts, n + 1 entries, and the indices of the sets that contain
+/// each node.
 fn sets_by_node<'a, I: Iterator<Item = &'a [u32]>>(n: usize, sets: impl Fn() -> I) -> (Vec<u32>, Vec<u32>) {
     let mut start = vec![0u32; n + 1];
     sets().flatten().for_each(|&node| start[node as usize + 1] += 1);
@@ -267,10 +267,11 @@ pub fn visit<const D: usize>(
     Ok(())
 }
 
-/// Assemble the stiffness matrix of a space in the dofs of `frame` on a graph, which may have the rows of some nodes only.
+/// Assemble the stiffness matrix of a space in the dofs of `frame` on a graph, which may have the rows of some nodes
+/// only.
 ///
-/// Where the elasticity varies within a cell, and in bodies of revolution, it is evaluated at the points of a rule of degree 2
-/// (P1) or 5 (P2). All of these points lie off the axis.
+/// Where the elasticity varies within a cell, and in bodies of revolution, it is evaluated at the points of a rule of
+/// degree 2 (P1) or 5 (P2). All of these points lie off the axis.
 ///
 /// # Errors
 /// [`Defect`]: a cell whose map is not invertible at an integration point, or a point without elasticity.
@@ -291,21 +292,22 @@ pub fn stiffness<const D: usize>(
         }
         blocks.fill([[0.0; D]; D]);
         let is_affine = space.order > Order::P2 && !space.axisymmetric && elasticity.is_constant_in(index);
-        match is_affine && space.is_straight(index) {
-            true => affine(space, elasticity, index, &mut blocks)?,
-            false => visit(space, elasticity, &rules, index, |point, material| {
+        if is_affine && space.is_straight(index) {
+            affine(space, elasticity, index, &mut blocks)?
+        } else {
+            visit(space, elasticity, &rules, index, |point, material| {
                 let hoop = |phi: &f64| space.hoop(&point.at, *phi);
                 let hoops: Vec<f64> = point.phi.iter().filter(|_| space.axisymmetric).map(hoop).collect();
                 material.accumulate(&point.gradient, &hoops, point.weight, &mut blocks);
-            })?,
+            })?
         }
         scatter(graph, &nodes, &blocks, &mut matrix);
     }
     Ok(matrix)
 }
 
-/// Compute the blocks of a straight triangle with one elasticity from the products of the derivatives on the reference triangle: with the gradients g_c of the
-/// barycentric coordinates, phi_a has the gradient sum_c phi_a,c g_c.
+/// Compute the blocks of a straight triangle with one elasticity from the products of the derivatives on the reference
+/// triangle: with the gradients g_c of the barycentric coordinates, phi_a has the gradient sum_c phi_a,c g_c.
 fn affine<const D: usize>(
     space: &Space<D>,
     elasticity: &Elasticity,
@@ -349,7 +351,8 @@ fn scatter<const D: usize>(graph: &NodeGraph, nodes: &[Node<D>], blocks: &[[[f64
     }
 }
 
-/// Add the symmetric stiffness matrix of a cell whose nodes have their own dofs. Rows of the graph are sorted, so that one walk finds all nodes of the cell.
+/// Add the symmetric stiffness matrix of a cell whose nodes have their own dofs. Rows of the graph are sorted, so that
+/// one walk finds all nodes of the cell.
 fn scatter_free<const D: usize>(graph: &NodeGraph, nodes: &[Node<D>], blocks: &[[[f64; D]; D]], matrix: &mut Csr) {
     let stride = nodes.len();
     let mut sorted: Vec<usize> = (0..stride).collect();
@@ -417,8 +420,8 @@ impl<const D: usize> NodalForces<D> {
         std::array::from_fn(|c| self.forces.iter().map(|&force| pad(force)[c]).collect::<Total>().value())
     }
 
-    /// Return the work of the forces on a displacement, and the largest work of forces and displacements of these sizes at each
-    /// node. `at` gives the displacement of a node.
+    /// Return the work of the forces on a displacement, and the largest work of forces and displacements of these sizes
+    /// at each node. `at` gives the displacement of a node.
     pub fn works(&self, at: impl Fn(u32) -> [f64; D]) -> [f64; 2] {
         let [mut work, mut largest] = [Total::default(); 2];
         for (node, force) in self.iter() {
@@ -484,8 +487,8 @@ pub fn body_force<const D: usize>(space: &Space<D>, density: &dyn Fn([f64; D]) -
 
 /// A discretised elastic body: stiffness K, load f, and the terms that were eliminated with the prescribed dofs.
 ///
-/// A prescribed dof c with the value u_c stays as a row of K with one entry, `K[c][c]` = a typical diagonal, and
-/// `f[c] = K[c][c] u_c`. Its residual then vanishes at the prescribed value. Its column is moved to the right-hand side.
+/// A prescribed dof c with the value u_c stays as a row of K with one entry, `K[c][c]` = a typical diagonal, and `f[c]
+/// = K[c][c] u_c`. Its residual then vanishes at the prescribed value. Its column is moved to the right-hand side.
 #[derive(Debug, Clone, Default)]
 pub struct ElasticBody {
     /// Stiffness matrix K, symmetric positive semidefinite.
@@ -504,7 +507,8 @@ pub struct ElasticBody {
     pub held: Couplings,
 }
 
-/// The entries of K that were eliminated with the prescribed dofs. Other loads and prescribed values with the same K need them.
+/// The entries of K that were eliminated with the prescribed dofs. Other loads and prescribed values with the same K
+/// need them.
 #[derive(Debug, Clone, Default)]
 pub struct Couplings {
     /// Entries (row, column, value) of K in the columns of the prescribed dofs, row by row.
@@ -547,7 +551,8 @@ impl ElasticBody {
 
 /// Eliminate prescribed dofs from K and f, symmetrically, and keep the terms that energies need.
 ///
-/// `prescribed` holds (dof, value), sorted, without repetition. Empty rows of K belong to other ranks, which also account for their energies.
+/// `prescribed` holds (dof, value), sorted, without repetition. Empty rows of K belong to other ranks, which also
+/// account for their energies.
 pub fn support(mut stiffness: Csr, load: Vec<f64>, prescribed: Vec<(usize, f64)>) -> ElasticBody {
     let n = load.len();
     let mut is_free = vec![true; n];

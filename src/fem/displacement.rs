@@ -8,12 +8,12 @@ use crate::problem::order::Order;
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
-/// Return the stress (xx yy zz xy yz xz) at every node: the mean of the stresses that the cells around the node have there, weighted by
-/// their measures. In bodies of revolution zz is the stress along the circles.
+/// Return the stress (xx yy zz xy yz xz) at every node: the mean of the stresses that the cells around the node have
+/// there, weighted by their measures. In bodies of revolution zz is the stress along the circles.
 ///
-/// `u` has one entry a dof. The nodes of the space are cut apart where the material jumps ([`Split`](super::Split)), so that a mean is over cells
-/// of one material. Where the elasticity has no value at a node, as on the axis of cylindrical axes, that of an integration
-/// point of the cell is used.
+/// `u` has one entry a dof. The nodes of the space are cut apart where the material jumps ([`Split`](super::Split)), so
+/// that a mean is over cells of one material. Where the elasticity has no value at a node, as on the axis of
+/// cylindrical axes, that of an integration point of the cell is used.
 pub fn nodal_stresses<const D: usize>(space: &Space<D>, elasticity: &Elasticity, u: &[f64]) -> Vec<[f64; 6]> {
     let mut sum = vec![[0.0; 6]; space.nodes.len()];
     let mut volume = vec![0.0; space.nodes.len()];
@@ -64,9 +64,9 @@ fn stress_at<const D: usize>(
     Some((point.measure, material.ok()?.stress(&point.slope(u).strain())))
 }
 
-/// Return by how much the stress changes from a node, where it is `stress`, to the middles of the cells around the node: the largest von Mises stress
-/// of the differences, relative to that at the node. It is about the relative error of the stress at the node with linear elements, and the square
-/// of it with quadratic ones, where it is small.
+/// Return by how much the stress changes from a node, where it is `stress`, to the middles of the cells around the
+/// node: the largest von Mises stress of the differences, relative to that at the node. It is about the relative error
+/// of the stress at the node with linear elements, and the square of it with quadratic ones, where it is small.
 pub fn change_within_cells<const D: usize>(
     space: &Space<D>,
     elasticity: &Elasticity,
@@ -81,7 +81,8 @@ pub fn change_within_cells<const D: usize>(
     inside.map(change).fold(0.0, f64::max) / von_mises(stress)
 }
 
-/// Return the principal stresses of (xx yy zz xy yz xz), the largest first (tension is positive); NaN if the stress is not finite.
+/// Return the principal stresses of (xx yy zz xy yz xz), the largest first (tension is positive); NaN if the stress is
+/// not finite.
 pub fn principal(s: &[f64; 6]) -> [f64; 3] {
     if s.iter().any(|s| !s.is_finite()) {
         return [f64::NAN; 3];
@@ -100,8 +101,8 @@ pub fn von_mises(s: &[f64; 6]) -> f64 {
     (0.5 * normal + 3.0 * (xy * xy + yz * yz + xz * xz)).sqrt()
 }
 
-/// Largest strain that counts as small. The strain e of linear theory differs there by 1.5 per cent from Green's strain e + e^2/2 and
-/// from the logarithmic strain e - e^2/2. This is no more than the uncertainty of moduli.
+/// Largest strain that counts as small. The strain e of linear theory differs there by 1.5 per cent from Green's strain
+/// e + e^2/2 and from the logarithmic strain e - e^2/2. This is no more than the uncertainty of moduli.
 pub const SMALL: f64 = 0.03;
 
 /// The largest strain in some cells of a body.
@@ -126,8 +127,8 @@ impl Strained {
     }
 }
 
-/// Return the integral over some cells of the rotation vector (x, y, z) of the displacement `u`, one entry a dof. It is zero in a body of
-/// revolution, which does not turn.
+/// Return the integral over some cells of the rotation vector (x, y, z) of the displacement `u`, one entry a dof. It is
+/// zero in a body of revolution, which does not turn.
 pub fn rotation<const D: usize>(space: &Space<D>, cells: impl Iterator<Item = usize>, u: &[f64]) -> [f64; 3] {
     let centre = [1.0 / (D + 1) as f64; 4];
     let mut sum = [0.0; 3];
@@ -144,8 +145,9 @@ pub fn rotation<const D: usize>(space: &Space<D>, cells: impl Iterator<Item = us
 
 /// Return the largest strain at the centres of some cells of a space for the displacement `u`, one entry a dof.
 ///
-/// At its centre a linear element has its mean strain. The value at a singular corner is therefore that of a cell and is not
-/// extrapolated to the corner. The norm of a strain is no less than its largest principal strain, so that few cells need the latter.
+/// At its centre a linear element has its mean strain. The value at a singular corner is therefore that of a cell and
+/// is not extrapolated to the corner. The norm of a strain is no less than its largest principal strain, so that few
+/// cells need the latter.
 pub fn largest_strain<const D: usize>(space: &Space<D>, cells: impl Iterator<Item = usize>, u: &[f64]) -> Strained {
     let centre = [1.0 / (D + 1) as f64; 4];
     let mut found = Strained::NONE;
@@ -165,8 +167,8 @@ pub fn largest_strain<const D: usize>(space: &Space<D>, cells: impl Iterator<Ite
     found
 }
 
-/// Return the root of the sum of the squares of the tensor's nine components. `strain` holds twice each shear strain, which occurs two
-/// times in the tensor.
+/// Return the root of the sum of the squares of the tensor's nine components. `strain` holds twice each shear strain,
+/// which occurs two times in the tensor.
 fn norm(strain: &[f64; 6]) -> f64 {
     let [xx, yy, zz, xy, yz, xz] = *strain;
     (xx * xx + yy * yy + zz * zz + 0.5 * (xy * xy + yz * yz + xz * xz)).sqrt()
@@ -199,11 +201,12 @@ pub struct Exact<const D: usize> {
     pub gradient: [[f64; D]; D],
 }
 
-/// Return the norms of u_h - u and of u, in this order, over some cells of a space, by a rule exact to degree five, or that of products of
-/// two displacements and one more.
+/// Return the norms of u_h - u and of u, in this order, over some cells of a space, by a rule exact to degree five, or
+/// that of products of two displacements and one more.
 ///
-/// The argument `u` is the finite element displacement u_h, one entry a dof, and `exact` is the known displacement u. Points without
-/// elasticity, which assembly refuses, count without energy. The norms are NaN where `exact` is not finite.
+/// The argument `u` is the finite element displacement u_h, one entry a dof, and `exact` is the known displacement u.
+/// Points without elasticity, which assembly refuses, count without energy. The norms are NaN where `exact` is not
+/// finite.
 pub fn norms_of_error<const D: usize>(
     space: &Space<D>,
     cells: impl Iterator<Item = usize>,

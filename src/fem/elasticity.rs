@@ -1,5 +1,5 @@
-//! Elasticity of a body: Hooke's law sigma = C eps (2) at a point, the bounds on C (4), and constants of the scene that are the same
-//! everywhere, differ by region, or depend on the point.
+//! Elasticity of a body: Hooke's law sigma = C eps (2) at a point, the bounds on C (4), and constants of the scene that
+//! are the same everywhere, differ by region, or depend on the point.
 
 use super::space::{PAIRS, Slope, component};
 use super::{cross, length};
@@ -60,8 +60,8 @@ impl MaterialRegion {
 }
 
 impl Elasticity {
-    /// Make the elasticity of a body from its own constants (`specs[0]`) and those of its regions. `of_cell` gives the index of
-    /// the spec of each cell, or is empty.
+    /// Make the elasticity of a body from its own constants (`specs[0]`) and those of its regions. `of_cell` gives the
+    /// index of the spec of each cell, or is empty.
     ///
     /// # Errors
     /// Constants without expressions that are not a valid material, with the index of their spec.
@@ -112,7 +112,8 @@ impl Elasticity {
         }
     }
 
-    /// Return Young's modulus in a cell at a point, for an anisotropic material the mean of its moduli along x, y and z.
+    /// Return Young's modulus in a cell at a point, for an anisotropic material the mean of its moduli along x, y and
+    /// z.
     ///
     /// # Errors
     /// As [`Elasticity::at`].
@@ -147,10 +148,11 @@ fn material(spec: &ElasticitySpec, tensor: Tensor, x: [f64; 3], dimension: usize
     }
 }
 
-/// Range of the moduli that a run computes with. The moduli of known materials are between 1e-30 and 1e30 in all units in use.
+/// Range of the moduli that a run computes with. The moduli of known materials are between 1e-30 and 1e30 in all units
+/// in use.
 ///
-/// Energies are products of at most a modulus, two displacements and lengths of [1e-40, 1e40](crate::mesh::LENGTHS). Rounding takes a
-/// share of 1e-32 of them, and forces are squared.
+/// Energies are products of at most a modulus, two displacements and lengths of [1e-40, 1e40](crate::mesh::LENGTHS).
+/// Rounding takes a share of 1e-32 of them, and forces are squared.
 const MODULI: [f64; 2] = [1e-50, 1e50];
 
 /// Return whether a modulus is in this range.
@@ -278,8 +280,9 @@ impl Tensor {
         Self(c)
     }
 
-    /// Make the orthotropic tensor with axes 1, 2, 3 along x, y, z from E1 E2 E3, nu12 nu13 nu23 and G12 G13 G23. Here nu12 is
-    /// the contraction along 2 under tension along 1. Return `None` if the stiffness for these moduli is not finite.
+    /// Make the orthotropic tensor with axes 1, 2, 3 along x, y, z from E1 E2 E3, nu12 nu13 nu23 and G12 G13 G23. Here
+    /// nu12 is the contraction along 2 under tension along 1. Return `None` if the stiffness for these moduli is not
+    /// finite.
     pub fn orthotropic(constants: &[f64; 9]) -> Option<Self> {
         let [e1, e2, e3, nu12, nu13, nu23, g12, g13, g23] = *constants;
         let (s12, s13, s23) = (-nu12 / e1, -nu13 / e1, -nu23 / e2);
@@ -308,10 +311,11 @@ impl Tensor {
         Self(c)
     }
 
-    /// Return the tensor in x, y, z of a material whose axes 1, 2, 3 have the directions `axes[0..3]` (orthonormal rows).
+    /// Return the tensor in x, y, z of a material whose axes 1, 2, 3 have the directions `axes[0..3]` (orthonormal
+    /// rows).
     pub fn rotated(&self, axes: &[[f64; 3]; 3]) -> Self {
-        // The stress in x, y, z is `bond` times the stress in the material's axes. Since work does not depend on the axes, strains
-        // are transformed by the transpose.
+        // The stress in x, y, z is `bond` times the stress in the material's axes. Since work does not depend on the
+        // axes, strains are transformed by the transpose.
         let bond = Matrix6::from_fn(|row, column| {
             let ((i, j), (a, b)) = (PAIRS[row], PAIRS[column]);
             let once = axes[a][i] * axes[b][j];
@@ -339,7 +343,8 @@ impl Tensor {
         (scaled - SINGULAR * Matrix6::identity()).cholesky().is_some()
     }
 
-    /// Return the least C eps : eps over strains with eps : eps = 1, which does not depend on the axes; NaN if C is not finite.
+    /// Return the least C eps : eps over strains with eps : eps = 1, which does not depend on the axes; NaN if C is not
+    /// finite.
     pub fn least_eigenvalue(&self) -> f64 {
         if self.0.as_flattened().iter().any(|c| !c.is_finite()) {
             return f64::NAN;
@@ -353,10 +358,11 @@ impl Tensor {
         self.matrix().try_inverse().map_or(f64::NAN, |s| (0..3).map(|i| 1.0 / s[(i, i)]).sum::<f64>() / 3.0)
     }
 
-    /// Return the stiffness against uniaxial stress along x, y and z of a body that is constrained in one direction across it, as
-    /// the mean for both directions. It is E/(1 - nu^2) if the material is isotropic.
+    /// Return the stiffness against uniaxial stress along x, y and z of a body that is constrained in one direction
+    /// across it, as the mean for both directions. It is E/(1 - nu^2) if the material is isotropic.
     ///
-    /// In plane problems z is constrained (plane strain, bodies of revolution) or free (plane stress), and the z entry is zero.
+    /// In plane problems z is constrained (plane strain, bodies of revolution) or free (plane stress), and the z entry
+    /// is zero.
     pub fn moduli(&self, dimension: usize, plane: Plane) -> [f64; 3] {
         let Some(s) = self.matrix().try_inverse() else { return [0.0; 3] };
         let constrained = |i: usize, j: usize| 1.0 / (s[(i, i)] - s[(i, j)].powi(2) / s[(j, j)]);
@@ -392,7 +398,8 @@ fn lame(young: f64, poisson: f64) -> (f64, f64) {
     (young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson)), young / (2.0 * (1.0 + poisson)))
 }
 
-/// Hooke's law of a body in its dimension. Its C is that of space, which also holds for plane strain, or that of plane stress.
+/// Hooke's law of a body in its dimension. Its C is that of space, which also holds for plane strain, or that of plane
+/// stress.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Material {
     /// Stress (xx yy zz xy yz xz) per strain.
@@ -402,7 +409,8 @@ pub struct Material {
 }
 
 impl Material {
-    /// Make the isotropic law from Young's modulus and Poisson's ratio, in `dimension` 2 or 3 (`plane` matters in 2 only).
+    /// Make the isotropic law from Young's modulus and Poisson's ratio, in `dimension` 2 or 3 (`plane` matters in 2
+    /// only).
     pub fn isotropic(young: f64, poisson: f64, dimension: usize, plane: Plane) -> Self {
         let (lambda, mu) = lame(young, poisson);
         let reduced = match (dimension, plane) {
@@ -418,10 +426,12 @@ impl Material {
         Self { stiffness, lame: None }
     }
 
-    /// Add `weight` times the D x D blocks B_a' C B_b of the stiffness density for all nodes a <= b to `local[a n + b]`.
+    /// Add `weight` times the D x D blocks B_a' C B_b of the stiffness density for all nodes a <= b to `local[a n +
+    /// b]`.
     ///
-    /// B_a gives the strain for the displacement of node a, and n is the number of nodes. `gradient[a]` is the gradient of the
-    /// shape function of node a. In a body of revolution `hoop[a]` is this function over the radius; in others `hoop` is empty.
+    /// B_a gives the strain for the displacement of node a, and n is the number of nodes. `gradient[a]` is the gradient
+    /// of the shape function of node a. In a body of revolution `hoop[a]` is this function over the radius; in others
+    /// `hoop` is empty.
     pub fn accumulate<const D: usize>(
         &self,
         gradient: &[[f64; D]],
@@ -522,7 +532,8 @@ mod tests {
         [[c, s, 0.0], [-s * d, c * d, t], [s * t, -c * t, d]]
     }
 
-    /// The matrix of 36 constants gives the same stress in rotated axes as sigma_ij = C_ijkl h_kl with all 81 constants.
+    /// The matrix of 36 constants gives the same stress in rotated axes as sigma_ij = C_ijkl h_kl with all 81
+    /// constants.
     #[test]
     fn hookes_law_in_turned_axes() {
         let axes = some_axes();
@@ -579,7 +590,8 @@ mod tests {
         assert!(apart.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) < 1e-14);
     }
 
-    /// In plane stress there is no stress out of the plane. The strains zz, yz, xz for this give the same stress by the law of space.
+    /// In plane stress there is no stress out of the plane. The strains zz, yz, xz for this give the same stress by the
+    /// law of space.
     #[test]
     fn plane_stress_of_a_triclinic_material() {
         let tensor = Tensor::anisotropic(&TRICLINIC).rotated(&some_axes());

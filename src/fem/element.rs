@@ -1,4 +1,5 @@
-//! Lagrange simplices, of order one and two in space and of any order in the plane, and quadrature on them, in barycentric coordinates.
+//! Lagrange simplices, of order one and two in space and of any order in the plane, and quadrature on them, in
+//! barycentric coordinates.
 //!
 //! ```text
 //! line       triangle          tetrahedron (VTK)
@@ -6,8 +7,9 @@
 //! 0-(2)-1       5 4              edges 4: 01, 5: 12, 6: 02, 7: 03, 8: 13, 9: 23
 //!              0 3 1
 //! ```
-//! In barycentric coordinates l the shape functions of lines, triangles and tetrahedra are the same: phi_i = l_i for order one,
-//! and l_i (2 l_i - 1) at vertices and 4 l_i l_j on edges for order two. Those of higher orders are in [`lagrange`].
+//! In barycentric coordinates l the shape functions of lines, triangles and tetrahedra are the same: phi_i = l_i for
+//! order one, and l_i (2 l_i - 1) at vertices and 4 l_i l_j on edges for order two. Those of higher orders are in
+//! [`lagrange`].
 
 use super::lagrange;
 pub use super::lagrange::{EDGES, Slopes, Values, gauss};
@@ -40,8 +42,8 @@ pub fn values(order: Order, l: &[f64]) -> Values {
     }
 }
 
-/// Return the derivatives of the shape functions by the barycentric coordinates at `l`. Only their differences have a meaning, since the coordinates sum to one.
-/// Entry `[node][coordinate]` is zero beyond the coordinates of `l`.
+/// Return the derivatives of the shape functions by the barycentric coordinates at `l`. Only their differences have a
+/// meaning, since the coordinates sum to one. Entry `[node][coordinate]` is zero beyond the coordinates of `l`.
 pub fn derivatives(order: Order, l: &[f64]) -> Slopes {
     let vertices = l.len();
     let mut d: Slopes = SmallVec::from_elem([0.0; 4], node_count(vertices, order));
@@ -72,7 +74,8 @@ pub fn place(order: Order, vertices: usize, node: usize) -> [f64; 4] {
     }
 }
 
-/// Return the local numbers of the nodes of an element inside the edge between two of its `vertices` vertices, from the first to the second.
+/// Return the local numbers of the nodes of an element inside the edge between two of its `vertices` vertices, from the
+/// first to the second.
 pub fn inside_edge(order: Order, vertices: usize, [i, j]: [usize; 2]) -> impl Iterator<Item = usize> {
     let (count, is_forward) = (order.degree() - 1, i < j);
     let edge = EDGES.iter().position(|&edge| edge == (i.min(j), i.max(j))).unwrap_or(0);
@@ -92,8 +95,9 @@ pub fn nodes<const N: usize>(order: Order) -> Vec<[f64; N]> {
 /// The gradients in space of the shape functions of a cell, one entry a node.
 pub type Gradients<const D: usize> = SmallVec<[[f64; D]; 10]>;
 
-/// Return the gradients in space of the shape functions of a cell at a point, and the measure there. The measure is
-/// the area or volume of the affine simplex with the same Jacobian. The result is `None` if the map is singular or inverted there.
+/// Return the gradients in space of the shape functions of a cell at a point, and the measure there. The measure is the
+/// area or volume of the affine simplex with the same Jacobian. The result is `None` if the map is singular or inverted
+/// there.
 ///
 /// `d` are the [`derivatives`] there, and `x` are the coordinates of the element's nodes (isoparametric).
 pub fn gradients<const D: usize>(x: &[[f64; D]], d: &Slopes) -> Option<(Gradients<D>, f64)> {
@@ -150,7 +154,8 @@ pub fn invert<const D: usize>(a: &[[f64; D]; D]) -> Option<([[f64; D]; D], f64)>
     Some((inverse, det))
 }
 
-/// Return whether the nodes of a simplex with `vertices` vertices lie where straight edges would have them, up to rounding of the coordinates `x`.
+/// Return whether the nodes of a simplex with `vertices` vertices lie where straight edges would have them, up to
+/// rounding of the coordinates `x`.
 pub fn is_straight<const D: usize>(order: Order, x: &[[f64; D]], vertices: usize) -> bool {
     (vertices..x.len()).all(|node| {
         let l = place(order, vertices, node);
@@ -165,8 +170,8 @@ pub fn interpolate<const D: usize>(x: &[[f64; D]], phi: &[f64]) -> [f64; D] {
     std::array::from_fn(|i| x.iter().zip(phi).map(|(x, phi)| phi * x[i]).sum())
 }
 
-/// Return the derivative of the map to an element with nodes `x` by the barycentric coordinate l[k + 1]. When that coordinate grows, l[0] becomes
-/// smaller by as much.
+/// Return the derivative of the map to an element with nodes `x` by the barycentric coordinate l[k + 1]. When that
+/// coordinate grows, l[0] becomes smaller by as much.
 pub fn tangent<const D: usize>(order: Order, x: &[[f64; D]], l: &[f64], k: usize) -> [f64; D] {
     if order == Order::P1 {
         // Most facets are straight, and this is needed several times for each two facets that may touch.
@@ -195,14 +200,16 @@ impl Rule {
         nodes.with_shapes(order)
     }
 
-    /// Return the rule with a table of the shape functions of this order, which saves the evaluation of orders above two in each cell.
+    /// Return the rule with a table of the shape functions of this order, which saves the evaluation of orders above
+    /// two in each cell.
     pub fn with_shapes(mut self, order: Order) -> Self {
         let shape = |l: &Vec<f64>| (values(order, l), derivatives(order, l));
         self.shapes = self.points.iter().filter(|_| order > Order::P2).map(shape).collect();
         self
     }
 
-    /// Return the values and derivatives of the shape functions of an order at a point, which are those of the table, if there is one.
+    /// Return the values and derivatives of the shape functions of an order at a point, which are those of the table,
+    /// if there is one.
     pub fn shape(&self, point: usize, order: Order) -> Cow<'_, (Values, Slopes)> {
         let compute = || Cow::Owned((values(order, &self.points[point]), derivatives(order, &self.points[point])));
         self.shapes.get(point).map_or_else(compute, Cow::Borrowed)
@@ -219,8 +226,8 @@ impl Rule {
     }
 }
 
-/// Return the rule on the simplex with so many vertices that is exact for polynomials of `degree`, at most 5 on tetrahedra, whose elements
-/// have an order of at most two.
+/// Return the rule on the simplex with so many vertices that is exact for polynomials of `degree`, at most 5 on
+/// tetrahedra, whose elements have an order of at most two.
 ///
 /// # Panics
 /// If the number of vertices is not from 1 to 4.

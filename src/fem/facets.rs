@@ -133,9 +133,9 @@ impl<const D: usize> Facets<D> {
         (0..self.count()).flat_map(normals).collect()
     }
 
-    /// Return the largest angle by which errors of coordinates turn the normal of a facet: those of two nodes, along and against
-    /// the normal, over the least height of the facet. At a corner of a quadratic facet, the weights of the nodes in a tangent are
-    /// 3, 4 and 1 instead of 1 and 1, and their sum grows with the square of the order.
+    /// Return the largest angle by which errors of coordinates turn the normal of a facet: those of two nodes, along
+    /// and against the normal, over the least height of the facet. At a corner of a quadratic facet, the weights of the
+    /// nodes in a tangent are 3, 4 and 1 instead of 1 and 1, and their sum grows with the square of the order.
     pub fn tilt(&self, space: &Space<D>, error: f64) -> f64 {
         let height = |i: usize| {
             let x = &self.coordinates(i, space)[..D];
@@ -155,8 +155,8 @@ impl<const D: usize> Facets<D> {
         Self { nodes: kept.collect(), ..*self }
     }
 
-    /// Return the edges of facet `i` (in the plane its ends), each opposite to one vertex. An edge is its sorted vertices with a
-    /// `u32::MAX` at the end, in place of the opposite vertex.
+    /// Return the edges of facet `i` (in the plane its ends), each opposite to one vertex. An edge is its sorted
+    /// vertices with a `u32::MAX` at the end, in place of the opposite vertex.
     pub fn edges(&self, i: usize) -> [[u32; D]; D] {
         let vertices = &self.facet(i)[..D];
         std::array::from_fn(|opposite| {
@@ -186,8 +186,8 @@ impl<const D: usize> Facets<D> {
     }
 }
 
-/// Return the outer normal times the length (2D) or area (3D) of a facet with node coordinates `x`, at barycentric point `l`. An
-/// integral over the facet uses weights that sum to one.
+/// Return the outer normal times the length (2D) or area (3D) of a facet with node coordinates `x`, at barycentric
+/// point `l`. An integral over the facet uses weights that sum to one.
 pub fn area_vector<const D: usize>(order: Order, x: &[[f64; D]], l: &[f64]) -> [f64; D] {
     let tangent = |k: usize| element::tangent(order, x, l, k);
     let t = tangent(0);

@@ -6,14 +6,17 @@
 //!
 //! with D x D blocks. Nodes without a row have u_i = v_i. There are rows of three kinds.
 //!
-//! - A support along an inclined direction turns the axes of its nodes, so that it prescribes one component there: u_i = Q' v_i.
+//! - A support along an inclined direction turns the axes of its nodes, so that it prescribes one component there: u_i
+//!   = Q' v_i.
 //! - A rigid surface ties its nodes to one of them, the master: u_i = u_A.
-//! - The nodes of a rigid surface that turns move by u_i = u_A + theta x (x_i - x_A). The rotation has the dofs of a second node, the pole:
-//!   v_P = L theta, with the distance L of the pole from the master. So v is a displacement like all other dofs, and with the farthest node as
-//!   the pole no node moves by more than v. In the plane theta is the first dof, and the other one is zero.
+//! - The nodes of a rigid surface that turns move by u_i = u_A + theta x (x_i - x_A). The rotation has the dofs of a
+//!   second node, the pole: v_P = L theta, with the distance L of the pole from the master. So v is a displacement like
+//!   all other dofs, and with the farthest node as the pole no node moves by more than v. In the plane theta is the
+//!   first dof, and the other one is zero.
 //!
-//! The dofs of tied nodes other than the pole must be prescribed as zero. By the second formula they are what a displacement differs from the
-//! constraint. In v every support is a prescribed dof, and the blocks of K keep their size.
+//! The dofs of tied nodes other than the pole must be prescribed as zero. By the second formula they are what a
+//! displacement differs from the constraint. In v every support is a prescribed dof, and the blocks of K keep their
+//! size.
 
 use super::{Space, cross, length, minus, pad, unit};
 use crate::exchange::Plain;
@@ -28,7 +31,8 @@ pub type Row<const D: usize> = Vec<(u32, SMatrix<f64, D, D>)>;
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "[f64; D]: Plain, [[f64; D]; D]: Plain")]
 pub struct Frame<const D: usize> {
-    /// C: the dofs that move a node. The first entry of a tied node is that of its master, the entry of a turned node its own.
+    /// C: the dofs that move a node. The first entry of a tied node is that of its master, the entry of a turned node
+    /// its own.
     moved: BTreeMap<u32, Row<D>>,
     /// D: the displacements that give the dofs of a node.
     given: BTreeMap<u32, Row<D>>,
@@ -68,8 +72,8 @@ impl<const D: usize> Frame<D> {
         }
     }
 
-    /// Let nodes that are tied to the first of them turn as one. `x` gives the place of a node. In space they must not lie on one line. Return
-    /// the pole.
+    /// Let nodes that are tied to the first of them turn as one. `x` gives the place of a node. In space they must not
+    /// lie on one line. Return the pole.
     pub fn let_turn(&mut self, nodes: &[u32], x: impl Fn(u32) -> [f64; D]) -> u32 {
         let (one, master, tied) = (SMatrix::identity(), nodes[0], &nodes[1..]);
         let arm = |node: u32| minus(x(node), x(master));
@@ -80,7 +84,8 @@ impl<const D: usize> Frame<D> {
         let along = pad(unit(arm(pole)));
         let third = farthest(&|node| length(cross(along, pad(arm(node)))));
         let turning = |node: u32| rotation(arm(node), length(arm(pole)));
-        // the rotation of two nodes (in the plane of one) by least squares; in the plane the second dof does not move anything
+        // the rotation of two nodes (in the plane of one) by least squares; in the plane the second dof does not move
+        // anything
         let used = if D == 2 { vec![pole] } else { vec![pole, third] };
         let mut normal: SMatrix<f64, D, D> = used.iter().map(|&node| turning(node).transpose() * turning(node)).sum();
         if D == 2 {
@@ -100,8 +105,8 @@ impl<const D: usize> Frame<D> {
         pole
     }
 
-    /// Return nodal forces that do the work of a moment (x, y, z) on the rotation of the surface with this master and pole. `x` gives the place
-    /// of a node. Without rounding their sum is zero.
+    /// Return nodal forces that do the work of a moment (x, y, z) on the rotation of the surface with this master and
+    /// pole. `x` gives the place of a node. Without rounding their sum is zero.
     pub fn couple(
         &self,
         [master, pole]: [u32; 2],
@@ -154,7 +159,8 @@ impl<const D: usize> Frame<D> {
         rows.flat_map(|(node, row)| row.iter().map(|entry| entry.0).filter(move |other| other != node))
     }
 
-    /// Return the constraints of the sorted `nodes`, renumbered by their positions in this slice. It must contain the [`Frame::leaders`].
+    /// Return the constraints of the sorted `nodes`, renumbered by their positions in this slice. It must contain the
+    /// [`Frame::leaders`].
     pub fn on(&self, nodes: &[u32]) -> Self {
         let on = |rows: &BTreeMap<u32, Row<D>>| {
             let entry = |(node, matrix): &(u32, SMatrix<f64, D, D>)| Some((place(nodes, *node)?, *matrix));
@@ -165,7 +171,8 @@ impl<const D: usize> Frame<D> {
         Self { moved: on(&self.moved), given: on(&self.given) }
     }
 
-    /// Return a force at a node, or the entries of a row of B, as forces at dofs: the nodes of these dofs and the components.
+    /// Return a force at a node, or the entries of a row of B, as forces at dofs: the nodes of these dofs and the
+    /// components.
     pub fn force(&self, node: u32, force: [f64; D]) -> impl Iterator<Item = (u32, [f64; D])> {
         let row = self.row(node);
         let own = row.is_empty().then_some((node, force));

@@ -1,4 +1,5 @@
-//! Interpolation from linear displacements to those of higher orders. The linear ones are the coarse space of multigrid for elements of higher orders.
+//! Interpolation from linear displacements to those of higher orders. The linear ones are the coarse space of multigrid
+//! for elements of higher orders.
 
 use super::element;
 use super::frame::Frame;
@@ -26,7 +27,8 @@ impl Prolongation {
     }
 }
 
-/// Return the nodes of linear displacements, sorted: the corners of the cells of this rank, and the nodes that move tied ones.
+/// Return the nodes of linear displacements, sorted: the corners of the cells of this rank, and the nodes that move
+/// tied ones.
 pub fn coarse_nodes<const D: usize>(space: &Space<D>, frame: &Frame<D>) -> Vec<u32> {
     match space.order {
         Order::P1 => (0..space.nodes.len() as u32).collect(),
@@ -39,8 +41,9 @@ pub fn coarse_nodes<const D: usize>(space: &Space<D>, frame: &Frame<D>) -> Vec<u
 
 /// Return the interpolation from the dofs at the nodes `coarse` ([`coarse_nodes`]) to all dofs of a body.
 ///
-/// A node between vertices moves as their mean, weighted by its barycentric coordinates. Rows and columns of prescribed dofs are empty, except for a one
-/// where the dof is in both spaces, so that P'KP keeps its diagonal. The rows of nodes without cells on this rank are empty.
+/// A node between vertices moves as their mean, weighted by its barycentric coordinates. Rows and columns of prescribed
+/// dofs are empty, except for a one where the dof is in both spaces, so that P'KP keeps its diagonal. The rows of nodes
+/// without cells on this rank are empty.
 pub fn from_vertices<const D: usize>(
     space: &Space<D>,
     frame: &Frame<D>,
@@ -77,8 +80,8 @@ fn vertices_around<const D: usize>(space: &Space<D>) -> Vec<Vec<(u32, f64)>> {
     around
 }
 
-/// Return the row of the weighted mean displacement of vertices along an axis, without prescribed dofs. The columns are the dofs at the
-/// nodes `coarse`.
+/// Return the row of the weighted mean displacement of vertices along an axis, without prescribed dofs. The columns are
+/// the dofs at the nodes `coarse`.
 fn mean_of_vertices<const D: usize>(
     frame: &Frame<D>,
     vertices: &[(u32, f64)],
@@ -138,7 +141,8 @@ mod tests {
         close(&values, &all);
     }
 
-    /// Nodes that are tied to one in the middle of an edge move with it. Prescribed dofs have a one on the diagonal and no other entry.
+    /// Nodes that are tied to one in the middle of an edge move with it. Prescribed dofs have a one on the diagonal and
+    /// no other entry.
     #[test]
     fn supports_have_no_part() {
         let space = block::<3>(1, Order::P2);

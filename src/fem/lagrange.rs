@@ -1,6 +1,8 @@
-//! Lagrange functions of any order on lines and triangles, with Gauss-Lobatto nodes on lines and on the edges of triangles.
+//! Lagrange functions of any order on lines and triangles, with Gauss-Lobatto nodes on lines and on the edges of
+//! triangles.
 //!
-//! The functions are combinations of the orthogonal polynomials of Dubiner: with the Legendre polynomials P_n and the Jacobi polynomials P_m^(a,0),
+//! The functions are combinations of the orthogonal polynomials of Dubiner: with the Legendre polynomials P_n and the
+//! Jacobi polynomials P_m^(a,0),
 //!
 //! ```text
 //! psi_nm(l) = (l_0 + l_1)^n P_n((l_1 - l_0)/(l_1 + l_0)) P_m^(2n + 1, 0)(2 l_2 - 1),      n + m <= k
@@ -16,7 +18,8 @@ use std::sync::OnceLock;
 /// Edges of the simplex with four vertices in the order of the mid-edge nodes. A triangle uses 01 12 02 and a line 01.
 pub const EDGES: [(usize, usize); 6] = [(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)];
 
-/// Values of the shape functions of an element, one entry a node. Those of the elements in space fit without an allocation.
+/// Values of the shape functions of an element, one entry a node. Those of the elements in space fit without an
+/// allocation.
 pub type Values = SmallVec<[f64; 10]>;
 
 /// Derivatives of the shape functions of an element by its barycentric coordinates, one entry a node.
@@ -26,7 +29,8 @@ pub type Slopes = SmallVec<[[f64; 4]; 10]>;
 pub struct Lagrange {
     degree: usize,
     vertices: usize,
-    /// Barycentric coordinates of the nodes: the vertices, those inside each edge of [`EDGES`] from its first to its second end, those inside.
+    /// Barycentric coordinates of the nodes: the vertices, those inside each edge of [`EDGES`] from its first to its
+    /// second end, those inside.
     pub nodes: Vec<[f64; 3]>,
     /// Row i has the coefficients of phi_i in the orthogonal polynomials.
     coefficients: DMatrix<f64>,
@@ -34,7 +38,8 @@ pub struct Lagrange {
     products: OnceLock<Vec<[[f64; 2]; 2]>>,
 }
 
-/// A function of the barycentric coordinates l_1 and l_2 at a point: its value and its derivatives by them, where l_0 = 1 - l_1 - l_2.
+/// A function of the barycentric coordinates l_1 and l_2 at a point: its value and its derivatives by them, where l_0 =
+/// 1 - l_1 - l_2.
 #[derive(Clone, Copy)]
 struct Jet([f64; 3]);
 
@@ -80,8 +85,8 @@ impl Lagrange {
         (0..psi.len()).map(value).collect()
     }
 
-    /// Return, for each degree up to that of the functions, the mean square over the triangle of the part of a function in the orthogonal polynomials of this
-    /// degree. `at` gives the value of the function at a node.
+    /// Return, for each degree up to that of the functions, the mean square over the triangle of the part of a function
+    /// in the orthogonal polynomials of this degree. `at` gives the value of the function at a node.
     ///
     /// The mean square of psi_nm is 1/((2n + 1)(n + m + 1)).
     pub fn by_degree(&self, at: impl Fn(usize) -> f64) -> Vec<f64> {
@@ -95,8 +100,8 @@ impl Lagrange {
         squares
     }
 
-    /// Return the values at the nodes of the part of a function in the orthogonal polynomials of the highest degree. `at` gives the value of the function
-    /// at a node.
+    /// Return the values at the nodes of the part of a function in the orthogonal polynomials of the highest degree.
+    /// `at` gives the value of the function at a node.
     pub fn highest_part(&self, at: impl Fn(usize) -> f64) -> Vec<f64> {
         // the functions psi_nm with n + m = k are the last ones of their n
         let highest: Vec<usize> = (0..=self.degree).map(|n| (n + 1) * (2 * self.degree + 2 - n) / 2 - 1).collect();
@@ -123,8 +128,8 @@ impl Lagrange {
         (0..psi.len()).map(|i| [0.0, along(i, 1), along(i, 2), 0.0]).collect()
     }
 
-    /// Return, for each pair of nodes a and b of the triangle, the means over the triangle of the products of the derivatives of phi_a by l_(c+1) and of
-    /// phi_b by l_(d+1), where c and d are zero and one.
+    /// Return, for each pair of nodes a and b of the triangle, the means over the triangle of the products of the
+    /// derivatives of phi_a by l_(c+1) and of phi_b by l_(d+1), where c and d are zero and one.
     pub fn products(&self) -> &[[[f64; 2]; 2]] {
         self.products.get_or_init(|| {
             let count = self.nodes.len();
@@ -171,8 +176,8 @@ fn orthogonal(degree: usize, vertices: usize, l: &[f64]) -> Vec<Jet> {
     all
 }
 
-/// Return the nodes on a line or a triangle. Those inside a triangle are means of the nodes on lines, by the recursion of Isaac (2020): they need no
-/// table, and their Lebesgue constant is near the least known (5.3 at order 8).
+/// Return the nodes on a line or a triangle. Those inside a triangle are means of the nodes on lines, by the recursion
+/// of Isaac (2020): they need no table, and their Lebesgue constant is near the least known (5.3 at order 8).
 fn nodes(degree: usize, vertices: usize) -> Vec<[f64; 3]> {
     let mut nodes: Vec<[f64; 3]> =
         (0..vertices).map(|k| std::array::from_fn(|i| f64::from(u8::from(i == k)))).collect();
@@ -210,10 +215,12 @@ fn legendre(degree: usize, x: f64) -> [f64; 2] {
     [value, before]
 }
 
-/// Newton steps for a zero of a Legendre polynomial or its derivative. From the starts below six are enough for a double up to degree 20.
+/// Newton steps for a zero of a Legendre polynomial or its derivative. From the starts below six are enough for a
+/// double up to degree 20.
 const STEPS: usize = 8;
 
-/// Return the Gauss-Lobatto points of a degree on \[0, 1\], which are the ends and the zeros of the derivative of the Legendre polynomial.
+/// Return the Gauss-Lobatto points of a degree on \[0, 1\], which are the ends and the zeros of the derivative of the
+/// Legendre polynomial.
 fn gauss_lobatto(degree: usize) -> Vec<f64> {
     let n = degree as f64;
     let zero = |k: usize| {
@@ -260,7 +267,8 @@ pub fn gauss(count: usize) -> Vec<(f64, f64)> {
     below.chain(above).collect()
 }
 
-/// Add the points and weights of a rule on the triangle, exact for polynomials of `degree`: Gauss points on the square that collapses into vertex 2.
+/// Add the points and weights of a rule on the triangle, exact for polynomials of `degree`: Gauss points on the square
+/// that collapses into vertex 2.
 pub fn collapsed(degree: usize, add: &mut impl FnMut(&[f64], f64)) {
     let across = gauss(degree / 2 + 1);
     // the area shrinks towards the vertex, which is one more degree
@@ -283,8 +291,9 @@ fn zero_of_legendre(count: usize, k: usize) -> (f64, f64) {
     (x, 2.0 / ((1.0 - x * x) * slope * slope))
 }
 
-/// Return the places of equally spaced points of a line or triangle, as ParaView and Gmsh have them: vertices, inside the edges as in
-/// [`Lagrange::nodes`], inside in triangles that lie in each other, each with its vertices, then its edges 01 12 20.
+/// Return the places of equally spaced points of a line or triangle, as ParaView and Gmsh have them: vertices, inside
+/// the edges as in [`Lagrange::nodes`], inside in triangles that lie in each other, each with its vertices, then its
+/// edges 01 12 20.
 pub fn equally_spaced(order: Order, vertices: usize) -> Vec<[f64; 3]> {
     let degree = order.degree();
     let mut places: Vec<[f64; 3]> =
@@ -304,7 +313,8 @@ pub fn equally_spaced(order: Order, vertices: usize) -> Vec<[f64; 3]> {
     places
 }
 
-/// Return the points of a triangle of a degree, and those of the triangles in it, whose corners are `margin` steps of 1/`whole` from the sides.
+/// Return the points of a triangle of a degree, and those of the triangles in it, whose corners are `margin` steps of
+/// 1/`whole` from the sides.
 fn nested(whole: usize, degree: usize, margin: usize) -> Vec<[f64; 3]> {
     let place = |index: [usize; 3]| index.map(|i| (i + margin) as f64 / whole as f64);
     if degree == 0 {
@@ -342,7 +352,8 @@ mod tests {
         [base.powi(degree as i32), 1.3 * slope, -0.4 * slope]
     }
 
-    /// Functions are one at their node and zero at the others, reproduce polynomials and their slopes, and have positive integrals on edges.
+    /// Functions are one at their node and zero at the others, reproduce polynomials and their slopes, and have
+    /// positive integrals on edges.
     #[test]
     fn functions_of_all_orders() {
         for (order, vertices) in all() {

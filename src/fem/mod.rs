@@ -1,7 +1,9 @@
-//! Finite elements on one body: P1 and P2 simplices, in the plane those of any order, linear elasticity, assembly into sparse rows.
+//! Finite elements on one body: P1 and P2 simplices, in the plane those of any order, linear elasticity, assembly into
+//! sparse rows.
 //!
-//! Data flow: [`Mesh`](crate::mesh::Mesh) group -> [`Space`] -> [`assemble`] -> [`ElasticBody`] {K, f, supports}. Afterwards
-//! [`displacement`] has the stresses of a displacement. Degrees of freedom are numbered `D * node + component`.
+//! Data flow: [`Mesh`](crate::mesh::Mesh) group -> [`Space`] -> [`assemble`] -> [`ElasticBody`] {K, f, supports}.
+//! Afterwards [`displacement`] has the stresses of a displacement. Degrees of freedom are numbered `D * node +
+//! component`.
 
 pub mod assemble;
 pub mod displacement;

@@ -1,8 +1,10 @@
-//! Displacements recovered by patches, and the error estimated from them: polynomial preserving recovery (Zhang and Naga 2005).
+//! Displacements recovered by patches, and the error estimated from them: polynomial preserving recovery (Zhang and
+//! Naga 2005).
 //!
-//! Around each vertex a polynomial of one degree more than the elements is fitted to the nodal displacements. Its gradient is of
-//! higher order than the discrete one on any mesh, at boundaries too. Patches end at the boundary of their body and where its material
-//! jumps ([`Split`](super::Split)), so nothing is smoothed across a contact or an interface. With P_i the polynomial of vertex i and l_i its barycentric coordinate (the hat function of the vertex)
+//! Around each vertex a polynomial of one degree more than the elements is fitted to the nodal displacements. Its
+//! gradient is of higher order than the discrete one on any mesh, at boundaries too. Patches end at the boundary of
+//! their body and where its material jumps ([`Split`](super::Split)), so nothing is smoothed across a contact or an
+//! interface. With P_i the polynomial of vertex i and l_i its barycentric coordinate (the hat function of the vertex)
 //!
 //! ```text
 //! u* = sum l_i P_i          the blend: continuous, since on a facet only the hats of its vertices are not zero
@@ -24,9 +26,9 @@ use crate::problem::order::Order;
 use patch::{Monomials, Patch, Rings};
 use std::borrow::Cow;
 
-/// Largest number of additional rings of cells that a patch gets while its nodes do not determine the polynomial. Cells at a
-/// corner of a body have few nodes, and with two more rings as many as others. No larger patch determines what is then still
-/// undetermined, such as the second derivative through a plate one cell thick.
+/// Largest number of additional rings of cells that a patch gets while its nodes do not determine the polynomial. Cells
+/// at a corner of a body have few nodes, and with two more rings as many as others. No larger patch determines what is
+/// then still undetermined, such as the second derivative through a plate one cell thick.
 const MORE_RINGS: usize = 3;
 
 /// A displacement with the polynomials recovered from it.
@@ -55,7 +57,8 @@ pub struct Errors {
 }
 
 impl<'a, const D: usize> Recovery<'a, D> {
-    /// Recover the polynomials of the displacement `u`, one entry per dof. The nodes of the space are cut apart where the material jumps.
+    /// Recover the polynomials of the displacement `u`, one entry per dof. The nodes of the space are cut apart where
+    /// the material jumps.
     pub fn new(space: &'a Space<D>, elasticity: &'a Elasticity, u: impl Into<Cow<'a, [f64]>>) -> Self {
         let degree = space.order.degree() + 1;
         let monomials = (0..=degree).rev().map(|degree| Monomials::new(D, degree)).collect();
@@ -68,8 +71,8 @@ impl<'a, const D: usize> Recovery<'a, D> {
         recovery
     }
 
-    /// Return whether each node is a vertex of the boundary. The axis of a body of revolution is not part of the boundary, since
-    /// the body continues beyond it.
+    /// Return whether each node is a vertex of the boundary. The axis of a body of revolution is not part of the
+    /// boundary, since the body continues beyond it.
     fn outer_vertices(&self) -> Vec<bool> {
         let mut outer = vec![false; self.space.nodes.len()];
         for (index, opposite) in self.space.lone_facets() {
@@ -81,8 +84,9 @@ impl<'a, const D: usize> Recovery<'a, D> {
         outer
     }
 
-    /// Return the polynomial of a vertex. A vertex on the boundary uses two rings of cells, since a single ring is one-sided. The
-    /// polynomial has a lower degree in a body or plate of so few cells that its nodes determine no more.
+    /// Return the polynomial of a vertex. A vertex on the boundary uses two rings of cells, since a single ring is
+    /// one-sided. The polynomial has a lower degree in a body or plate of so few cells that its nodes determine no
+    /// more.
     fn fit(&self, node: usize, is_outer: bool, rings: &mut Rings<D>) -> Option<Patch<D>> {
         let (space, u) = (self.space, &*self.displacement);
         let fit = |nodes: &[u32], monomials| Patch::fit(space, u, space.nodes[node], nodes, monomials);
@@ -101,8 +105,8 @@ impl<'a, const D: usize> Recovery<'a, D> {
         self.monomials.iter().find_map(|monomials| fit(nodes, monomials))
     }
 
-    /// Return the values of the blend at all nodes, one entry per dof. At a vertex it is the value of the polynomial, elsewhere
-    /// the mean of those of the vertices of the cell, weighted by the barycentric coordinates.
+    /// Return the values of the blend at all nodes, one entry per dof. At a vertex it is the value of the polynomial,
+    /// elsewhere the mean of those of the vertices of the cell, weighted by the barycentric coordinates.
     fn blend_nodes(&self) -> Vec<f64> {
         let space = self.space;
         let mut blended = vec![0.0; space.dofs()];
@@ -131,7 +135,8 @@ impl<'a, const D: usize> Recovery<'a, D> {
         }
     }
 
-    /// Return the stress (xx yy zz xy yz xz) of a strain in a cell at a point. Assembly evaluated the law there, so it has a value.
+    /// Return the stress (xx yy zz xy yz xz) of a strain in a cell at a point. Assembly evaluated the law there, so it
+    /// has a value.
     fn stress(&self, cell: usize, at: [f64; D], strain: &[f64; 6]) -> [f64; 6] {
         let material = self.elasticity.at(cell, self.space.in_scene(at));
         material.map_or([0.0; 6], |material| material.stress(strain))
@@ -139,16 +144,18 @@ impl<'a, const D: usize> Recovery<'a, D> {
 
     /// Return the errors of the displacement.
     ///
-    /// If the recovered displacement u* is exact, its distance from any one discrete displacement bounds the error, since the discrete solution u_h
-    /// is the best approximation. Where the solution is singular, u* misses the singular part: it is too far from u_h in some cells, and from its
-    /// nodal interpolant in others. With quadratic elements the smaller of both counts in each cell. That is no bound; on parts with known
-    /// energies it is 0.9 to 1.8 times the squared error. The quadrature of linear elements is too coarse for the energy of their
-    /// interpolant. With higher orders the distance from the interpolant is the smaller one in nearly all cells, and it alone counts.
+    /// If the recovered displacement u* is exact, its distance from any one discrete displacement bounds the error,
+    /// since the discrete solution u_h is the best approximation. Where the solution is singular, u* misses the
+    /// singular part: it is too far from u_h in some cells, and from its nodal interpolant in others. With quadratic
+    /// elements the smaller of both counts in each cell. That is no bound; on parts with known energies it is 0.9 to
+    /// 1.8 times the squared error. The quadrature of linear elements is too coarse for the energy of their
+    /// interpolant. With higher orders the distance from the interpolant is the smaller one in nearly all cells, and it
+    /// alone counts.
     ///
-    /// The load L of the interpolation error b does the work L(u_h) = eta^2 - f'b on the discrete displacement, except where the solution is
-    /// singular. The missing work is done by a multiple, at most one, of `Recovery::softening`. The argument `work_on_missed` is f'b, the work
-    /// of the pressures of contacts on b. It is a fifth of eta^2 with linear elements under a contact of a few cells, and small with quadratic
-    /// ones. Other loads act where b is small.
+    /// The load L of the interpolation error b does the work L(u_h) = eta^2 - f'b on the discrete displacement, except
+    /// where the solution is singular. The missing work is done by a multiple, at most one, of `Recovery::softening`.
+    /// The argument `work_on_missed` is f'b, the work of the pressures of contacts on b. It is a fifth of eta^2 with
+    /// linear elements under a contact of a few cells, and small with quadratic ones. Other loads act where b is small.
     pub fn errors(&self, work_on_missed: f64) -> Errors {
         let (of_interpolant, mut load) = self.interpolation_error();
         let mut cells = of_interpolant;
@@ -169,7 +176,8 @@ impl<'a, const D: usize> Recovery<'a, D> {
         Errors { cells, rates: self.rates(), strips, load }
     }
 
-    /// Return the power of its size with which the energy error of each cell falls: at most the degree k of the elements, from order three on.
+    /// Return the power of its size with which the energy error of each cell falls: at most the degree k of the
+    /// elements, from order three on.
     fn rates(&self) -> Vec<f64> {
         let degree = self.space.order.degree() as f64;
         match self.space.order {
@@ -180,9 +188,10 @@ impl<'a, const D: usize> Recovery<'a, D> {
 
     /// Return the power mu of the displacement in each cell of order three or more, from the decay of its polynomials.
     ///
-    /// A displacement r^mu around a point has an energy error of h^mu. The part A_n of its polynomials of degree n in a cell at the point, in the mean square,
-    /// falls as n^-(2 mu + 2), so that the last parts tell mu. Where the displacement is smooth, parts fall geometrically, which is a large power. Two
-    /// degrees are taken together, since functions may be nearly even or odd.
+    /// A displacement r^mu around a point has an energy error of h^mu. The part A_n of its polynomials of degree n in a
+    /// cell at the point, in the mean square, falls as n^-(2 mu + 2), so that the last parts tell mu. Where the
+    /// displacement is smooth, parts fall geometrically, which is a large power. Two degrees are taken together, since
+    /// functions may be nearly even or odd.
     fn powers(&self) -> Vec<f64> {
         let (order, degree) = (self.space.order, self.space.order.degree());
         let of_cell = |cell: &[u32]| {
@@ -211,7 +220,8 @@ impl<'a, const D: usize> Recovery<'a, D> {
         (0..self.space.cell_count()).map(of_cell).collect()
     }
 
-    /// Return the squared energy error of a linear cell. Its map and its discrete strain are constant, so that both are computed once.
+    /// Return the squared energy error of a linear cell. Its map and its discrete strain are constant, so that both are
+    /// computed once.
     fn energy_error_of_linear(&self, index: usize, rule: &element::Rule) -> f64 {
         let Some(first) = self.space.points(index, rule).flatten().next() else { return 0.0 };
         let errors = self.strain_errors(first.cell, &first.slope(&self.displacement));
@@ -229,8 +239,9 @@ impl<'a, const D: usize> Recovery<'a, D> {
         sum
     }
 
-    /// Return the strain of the recovered minus the discrete displacement in a linear cell, as coefficients of the products l_k l_m with k <= m.
-    /// The gradient of a parabola is linear, the blending weights are linear in linear elements, and all products sum to one.
+    /// Return the strain of the recovered minus the discrete displacement in a linear cell, as coefficients of the
+    /// products l_k l_m with k <= m. The gradient of a parabola is linear, the blending weights are linear in linear
+    /// elements, and all products sum to one.
     fn strain_errors(&self, cell: &[u32], discrete: &Slope<D>) -> Vec<[f64; 6]> {
         let error = |k: usize, m: usize| {
             let mut slope = Slope { h: self.jet(cell[k], &self.space.nodes[cell[m] as usize]).1, hoop: 0.0 };
@@ -250,7 +261,8 @@ impl<'a, const D: usize> Recovery<'a, D> {
         errors
     }
 
-    /// Return the gradient of the recovered displacement at a point with barycentric coordinates `l` of a cell or facet with these nodes.
+    /// Return the gradient of the recovered displacement at a point with barycentric coordinates `l` of a cell or facet
+    /// with these nodes.
     fn recovered_slope(&self, nodes: &[u32], l: &[f64], at: &[f64; D]) -> Slope<D> {
         let mut sum = Slope::ZERO;
         for (l, &node) in l.iter().zip(nodes) {
@@ -260,8 +272,8 @@ impl<'a, const D: usize> Recovery<'a, D> {
         sum
     }
 
-    /// Return the error b of the nodal interpolant at barycentric point `l` of a simplex with these nodes, which is a cell or a
-    /// facet.
+    /// Return the error b of the nodal interpolant at barycentric point `l` of a simplex with these nodes, which is a
+    /// cell or a facet.
     pub fn missed(&self, nodes: &[u32], l: &[f64]) -> [f64; D] {
         let phi = element::values(self.space.order, l);
         let mut at = [0.0; D];
@@ -278,8 +290,9 @@ impl<'a, const D: usize> Recovery<'a, D> {
         sum
     }
 
-    /// Return the squared energy norm of the interpolation error b on each cell, and the residual `-int sigma(b) : grad v` for every shape
-    /// function v, one entry per dof. A displacement with this residual is the error of the nodal values.
+    /// Return the squared energy norm of the interpolation error b on each cell, and the residual `-int sigma(b) : grad
+    /// v` for every shape function v, one entry per dof. A displacement with this residual is the error of the nodal
+    /// values.
     fn interpolation_error(&self) -> (Vec<f64>, Vec<f64>) {
         let space = self.space;
         // The gradient of b has one degree more than the elements, and that of v has one less.
@@ -314,17 +327,18 @@ impl<'a, const D: usize> Recovery<'a, D> {
         slope
     }
 
-    /// Return the load by which the discrete body is too stiff, one entry per dof, with the squared energy error eta_K^2 of each cell K:
+    /// Return the load by which the discrete body is too stiff, one entry per dof, with the squared energy error
+    /// eta_K^2 of each cell K:
     ///
     /// ```text
     /// s(v) = sum_K theta_K a_K(u_h, v),     theta_K = eta_K^2 / (eta_K^2 + a_K(u_h, u_h))
     /// ```
     ///
-    /// Loads f do the work f'e = a(u, e) = a(e, e) = eta^2 on the error e = u - u_h, since a(u_h, e) = 0. So the discrete body is too
-    /// stiff, and each cell contributes eta_K^2 to what its compliance lacks. The load is that of a body whose stiffness is lower by
-    /// theta_K in each cell. Its work s(u_h) is the sum of the eta_K^2 where these are small. The interpolation error of a recovered
-    /// displacement does the same work where the solution is smooth, but none where it is singular: recovered polynomials miss the
-    /// singular part, whose error reaches all nodes.
+    /// Loads f do the work f'e = a(u, e) = a(e, e) = eta^2 on the error e = u - u_h, since a(u_h, e) = 0. So the
+    /// discrete body is too stiff, and each cell contributes eta_K^2 to what its compliance lacks. The load is that of
+    /// a body whose stiffness is lower by theta_K in each cell. Its work s(u_h) is the sum of the eta_K^2 where these
+    /// are small. The interpolation error of a recovered displacement does the same work where the solution is smooth,
+    /// but none where it is singular: recovered polynomials miss the singular part, whose error reaches all nodes.
     fn softening(&self, errors: &[f64]) -> Vec<f64> {
         // Strains are of one degree less than the elements.
         let order = self.space.order;
@@ -353,7 +367,8 @@ fn add_stress<const D: usize>(point: &CellPoint<D>, weight: f64, stress: &[f64; 
     }
 }
 
-/// Return the gradients of the barycentric coordinates at a point, also in curved cells, from the values of the coordinates at the nodes.
+/// Return the gradients of the barycentric coordinates at a point, also in curved cells, from the values of the
+/// coordinates at the nodes.
 fn hats<const D: usize>(point: &CellPoint<D>) -> [[f64; D]; 4] {
     let mut hats = [[0.0; D]; 4];
     for (node, gradient) in point.gradient.iter().enumerate() {
@@ -381,8 +396,8 @@ mod tests {
         std::array::from_fn(|c| (1.0 + c as f64) * s.powi(degree) + x[c] * x[(c + 1) % D].powi(degree - 1))
     }
 
-    /// Check that a displacement of one degree more than the elements is recovered exactly, at the boundary too. Then the error of
-    /// its interpolant is exact.
+    /// Check that a displacement of one degree more than the elements is recovered exactly, at the boundary too. Then
+    /// the error of its interpolant is exact.
     fn next_degree_is_exact<const D: usize, const N: usize>(order: Order) {
         let degree = if order == Order::P1 { 2 } else { 3 };
         let space = block::<D>(3, order);
@@ -415,7 +430,8 @@ mod tests {
         next_degree_is_exact::<3, 4>(Order::P2);
     }
 
-    /// The rate of cells at a corner is about the power of a displacement there; that of the others grows to the degree of the elements.
+    /// The rate of cells at a corner is about the power of a displacement there; that of the others grows to the degree
+    /// of the elements.
     #[test]
     fn rates_tell_singular_cells() {
         let (order, steel) = (Order::new(6).expect("an order"), steel());
@@ -441,8 +457,8 @@ mod tests {
         [(k * x[0]).sin() * falling, 0.3 * (k * x[1]).cos() * falling, (k * x[0]).cos() * falling]
     }
 
-    /// Return the share of the error of the interpolant of a wave that is recovered in the cells at its face. It is the least-squares
-    /// factor from the exact error to the recovered one.
+    /// Return the share of the error of the interpolant of a wave that is recovered in the cells at its face. It is the
+    /// least-squares factor from the exact error to the recovered one.
     fn seen_of_wave(order: Order) -> f64 {
         let space = block::<3>(6, order);
         let u: Vec<f64> = space.nodes.iter().flat_map(wave).collect();
@@ -525,8 +541,8 @@ mod tests {
         }
     }
 
-    /// The work that contact pressures do on the interpolation error is not done by the load of a softer body. In the wave, that load does half of the
-    /// squared energy error.
+    /// The work that contact pressures do on the interpolation error is not done by the load of a softer body. In the
+    /// wave, that load does half of the squared energy error.
     #[test]
     fn work_on_the_interpolation_error_does_not_soften() {
         let space = block::<3>(3, Order::P1);

@@ -7,7 +7,8 @@ use crate::linalg::{Blocks, TOLERANCE, Total, around, bounds, dot, pad};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-/// A rigid motion as a sum of translations and rotations about a centre. It is stored in a few numbers, whatever the number of nodes.
+/// A rigid motion as a sum of translations and rotations about a centre. It is stored in a few numbers, whatever the
+/// number of nodes.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(bound = "[f64; D]: Plain")]
 pub struct RigidMotion<const D: usize> {
@@ -25,8 +26,8 @@ const PLANES: [(usize, usize, &str); 3] =
     [(1, 2, "rotation about x"), (2, 0, "rotation about y"), (0, 1, "rotation about z")];
 
 impl<const D: usize> RigidMotion<D> {
-    /// Return the motion in words, up to a thousandth of it: a translation along a direction, or a rotation. A rotation with a
-    /// translation is one about another axis.
+    /// Return the motion in words, up to a thousandth of it: a translation along a direction, or a rotation. A rotation
+    /// with a translation is one about another axis.
     pub fn in_words(&self) -> String {
         let (kind, v) = self.kind();
         let largest = v.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or_default();
@@ -79,8 +80,8 @@ const TURN: &str = "rotation about";
 /// Share of a motion below which a part of it is not mentioned.
 const SMALL: f64 = 1e-3;
 
-/// Return other combinations of motions about the same centre, and of the vectors that go with them, in which translations are apart
-/// from rotations, and both are along axes where these are among them. Translations come first.
+/// Return other combinations of motions about the same centre, and of the vectors that go with them, in which
+/// translations are apart from rotations, and both are along axes where these are among them. Translations come first.
 pub fn apart<const D: usize>(span: Vec<(RigidMotion<D>, DVector<f64>)>) -> Vec<(RigidMotion<D>, DVector<f64>)> {
     let mut span = span;
     let mut done = 0;
@@ -105,9 +106,11 @@ pub fn apart<const D: usize>(span: Vec<(RigidMotion<D>, DVector<f64>)>) -> Vec<(
     span
 }
 
-/// Return translations that turn rotations about all axes, as [`apart`] returns them, into rotations about one point; zeros unless all three are there.
+/// Return translations that turn rotations about all axes, as [`apart`] returns them, into rotations about one point;
+/// zeros unless all three are there.
 ///
-/// If the rotation about axis k comes with the translation T_kc along axis c, the symmetric part of T is what no common point explains.
+/// If the rotation about axis k comes with the translation T_kc along axis c, the symmetric part of T is what no common
+/// point explains.
 pub fn to_common_point<const D: usize>(motions: &[&RigidMotion<D>]) -> Vec<[f64; D]> {
     let mut shifts = vec![[0.0; D]; motions.len()];
     if D == 3 && motions.len() == 3 && motions.iter().all(|motion| motion.kind().0 == TURN) {
@@ -150,8 +153,8 @@ pub fn modes<const D: usize>(extent: &PointExtent) -> Vec<RigidMotion<D>> {
     translations.chain(rotations).map(motion).collect()
 }
 
-/// Return a basis of the motions that prescribed dofs leave unconstrained, as vectors of the weights of `count` motions. `value` gives
-/// the displacement of a motion at a dof.
+/// Return a basis of the motions that prescribed dofs leave unconstrained, as vectors of the weights of `count`
+/// motions. `value` gives the displacement of a motion at a dof.
 pub fn left_by_supports(
     count: usize,
     value: impl Fn(usize, usize) -> f64,

@@ -1,4 +1,5 @@
-//! The finite element space of one body: its nodes and cells, numbered within the body, and displacements at points of cells.
+//! The finite element space of one body: its nodes and cells, numbered within the body, and displacements at points of
+//! cells.
 
 use super::element::{self, Gradients, Rule, Slopes, Values};
 use super::{cross, lagrange, minus, pad};
@@ -11,8 +12,8 @@ use std::borrow::Cow;
 use std::cell::OnceCell;
 use std::collections::HashSet;
 
-/// The nodes and cells of one body. Nodes are numbered in order of first appearance in the cells, so that neighbours in the mesh
-/// file stay neighbours in memory.
+/// The nodes and cells of one body. Nodes are numbered in order of first appearance in the cells, so that neighbours in
+/// the mesh file stay neighbours in memory.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(bound = "[f64; D]: Plain")]
 pub struct Space<const D: usize> {
@@ -33,8 +34,8 @@ pub struct Space<const D: usize> {
     /// Body node of each vertex of the mesh; unknown in a part of a body.
     #[serde(skip)]
     from_mesh: Numbering,
-    /// First of the nodes inside each edge for the [point](edge_point) of the mesh that stands for the edge. They lie in
-    /// the direction from the end with the lower number in the mesh to the other one.
+    /// First of the nodes inside each edge for the [point](edge_point) of the mesh that stands for the edge. They lie
+    /// in the direction from the end with the lower number in the mesh to the other one.
     #[serde(skip)]
     edges: Numbering,
     /// Area (volume) of all cells, once it has been requested.
@@ -100,8 +101,8 @@ impl<const D: usize> Space<D> {
         }
     }
 
-    /// Return the space of some cells, in this order, and its nodes as numbered here, sorted. They are renumbered in the same order.
-    /// The part has no link to points of the mesh.
+    /// Return the space of some cells, in this order, and its nodes as numbered here, sorted. They are renumbered in
+    /// the same order. The part has no link to points of the mesh.
     pub fn part(&self, cells: impl Iterator<Item = usize>) -> (Self, Vec<u32>) {
         let cells = cells.flat_map(|cell| self.cell(cell));
         let cells: Vec<u32> = cells.copied().collect();
@@ -119,8 +120,8 @@ impl<const D: usize> Space<D> {
         Numbering::in_order(nodes).points().collect()
     }
 
-    /// Return the space of cells with nodes in the sorted slice `nodes`, which are renumbered by their positions there. The part has
-    /// no link to points of the mesh.
+    /// Return the space of cells with nodes in the sorted slice `nodes`, which are renumbered by their positions there.
+    /// The part has no link to points of the mesh.
     pub fn on(&self, cells: &[u32], nodes: &[u32]) -> Self {
         let number = Numbering::in_order(nodes.iter().copied());
         let own = nodes.iter().map(|&node| self.nodes[node as usize]).collect();
@@ -139,8 +140,8 @@ impl<const D: usize> Space<D> {
         self
     }
 
-    /// Return the length 2 pi r of the circle through a point of a meridian; 1 in other bodies. It is a factor of integrals over cells
-    /// and facets.
+    /// Return the length 2 pi r of the circle through a point of a meridian; 1 in other bodies. It is a factor of
+    /// integrals over cells and facets.
     pub fn circle(&self, at: &[f64; D]) -> f64 {
         if self.axisymmetric { std::f64::consts::TAU * at[0] } else { 1.0 }
     }
@@ -155,7 +156,8 @@ impl<const D: usize> Space<D> {
         self.axisymmetric && self.nodes[node as usize][0] == 0.0
     }
 
-    /// Return the contribution of a nodal force to the resultant. In a body of revolution it acts on a circle, so radial forces cancel.
+    /// Return the contribution of a nodal force to the resultant. In a body of revolution it acts on a circle, so
+    /// radial forces cancel.
     pub fn net_force(&self, force: [f64; D]) -> [f64; 3] {
         let mut net = pad(force);
         if self.axisymmetric {
@@ -190,7 +192,8 @@ impl<const D: usize> Space<D> {
         &self.cells[i * self.stride..(i + 1) * self.stride]
     }
 
-    /// Return the area (volume) of all cells from their corners. In a body of revolution it is the area of the meridian.
+    /// Return the area (volume) of all cells from their corners. In a body of revolution it is the area of the
+    /// meridian.
     pub fn measure(&self) -> f64 {
         *self.measure.get_or_init(|| (0..self.cell_count()).map(|i| self.cell_measure(i)).sum())
     }
@@ -210,8 +213,8 @@ impl<const D: usize> Space<D> {
         points
     }
 
-    /// Return the contribution of a cell to the measure of the body, from its corners. In a body of revolution it is the volume of a
-    /// ring.
+    /// Return the contribution of a cell to the measure of the body, from its corners. In a body of revolution it is
+    /// the volume of a ring.
     pub fn share(&self, i: usize) -> f64 {
         self.cell_measure(i) * self.circle(&self.centroid(i))
     }
@@ -224,15 +227,16 @@ impl<const D: usize> Space<D> {
         if D == 2 { 0.5 * normal[2].abs() } else { dot(&normal, &edge(3)).abs() / 6.0 }
     }
 
-    /// Return the point with barycentric coordinates `l` in cell `i`, whose nodes have the coordinates `x`. Its `weight` in an integral
-    /// over the body is that of a quadrature point with this `weight`. The result is `None` if the map of the cell is singular or
-    /// inverted there.
+    /// Return the point with barycentric coordinates `l` in cell `i`, whose nodes have the coordinates `x`. Its
+    /// `weight` in an integral over the body is that of a quadrature point with this `weight`. The result is `None` if
+    /// the map of the cell is singular or inverted there.
     pub fn point<'a>(&'a self, i: usize, x: &[[f64; D]], l: &'a [f64], weight: f64) -> Option<CellPoint<'a, D>> {
         let shape = (element::values(self.order, l), element::derivatives(self.order, l));
         self.point_of(i, x, l, weight, Cow::Owned(shape))
     }
 
-    /// Return the point of a cell as [`Space::point`] does, with the values and derivatives of the shape functions there.
+    /// Return the point of a cell as [`Space::point`] does, with the values and derivatives of the shape functions
+    /// there.
     fn point_of<'a>(
         &'a self,
         i: usize,
@@ -251,7 +255,8 @@ impl<const D: usize> Space<D> {
         Some(CellPoint { space: self, cell: self.cell(i), l, at, phi, gradient, measure, weight })
     }
 
-    /// Return the points of a quadrature rule in cell `i`; `None` for those where the map of the cell is singular or inverted.
+    /// Return the points of a quadrature rule in cell `i`; `None` for those where the map of the cell is singular or
+    /// inverted.
     pub fn points<'a>(&'a self, i: usize, rule: &'a Rule) -> impl Iterator<Item = Option<CellPoint<'a, D>>> {
         let x = self.cell_nodes(i);
         let shape = |k: usize| rule.shape(k, self.order);
@@ -291,8 +296,8 @@ impl<const D: usize> Space<D> {
         self.cell(i).iter().map(|&node| self.nodes[node as usize]).collect()
     }
 
-    /// Return the body's nodes of one simplex of a mesh group, or `None` if it is not part of this body: vertices, then those on edges, which are
-    /// not sorted above order two. Nodes inside the simplex are left out.
+    /// Return the body's nodes of one simplex of a mesh group, or `None` if it is not part of this body: vertices, then
+    /// those on edges, which are not sorted above order two. Nodes inside the simplex are left out.
     pub(super) fn simplex(&self, points: &[u32], dimension: usize) -> Option<Vec<u32>> {
         let vertices = points[..=dimension].iter().map(|&point| self.from_mesh.get(point));
         let mut nodes = vertices.collect::<Option<Vec<u32>>>()?;
@@ -303,7 +308,8 @@ impl<const D: usize> Space<D> {
         Some(nodes)
     }
 
-    /// Return all body nodes on a mesh group of any dimension, sorted. The result is empty if the group does not touch the body.
+    /// Return all body nodes on a mesh group of any dimension, sorted. The result is empty if the group does not touch
+    /// the body.
     pub fn nodes_on(&self, group: &Group) -> Vec<u32> {
         let mut nodes: Vec<u32> = match group.dimension {
             dimension if dimension == D => self.corners(&self.cells_in(group)),
@@ -381,8 +387,8 @@ impl<const D: usize> CellPoint<'_, D> {
         std::array::from_fn(at)
     }
 
-    /// Return the force on node `a` of the cell of a stress (xx yy zz xy yz xz) per volume: its product with the gradient of the shape
-    /// function of the node.
+    /// Return the force on node `a` of the cell of a stress (xx yy zz xy yz xz) per volume: its product with the
+    /// gradient of the shape function of the node.
     pub fn force(&self, stress: &[f64; 6], a: usize) -> [f64; D] {
         let along = |c: usize| (0..D).map(|j| stress[component(c, j)] * self.gradient[a][j]).sum();
         let mut force = std::array::from_fn(along);
@@ -406,8 +412,8 @@ pub fn component(i: usize, j: usize) -> usize {
 
 /// The gradient of a displacement at a point.
 ///
-/// In a body of revolution x is the radius r and y runs along the axis. The radial displacement u_r also stretches the circle through
-/// the point, so that the third normal strain is u_r/r.
+/// In a body of revolution x is the radius r and y runs along the axis. The radial displacement u_r also stretches the
+/// circle through the point, so that the third normal strain is u_r/r.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Slope<const D: usize> {
     /// Derivatives du_i/dx_j.
@@ -450,8 +456,8 @@ pub fn strain<const D: usize>(h: &[[f64; D]; D]) -> [f64; 6] {
     })
 }
 
-/// Return, from values at the nodes of a space, those at equally spaced points in place of the nodes, with which files are written. Up to order two they are
-/// the same.
+/// Return, from values at the nodes of a space, those at equally spaced points in place of the nodes, with which files
+/// are written. Up to order two they are the same.
 pub fn at_equally_spaced<'v, const D: usize, const N: usize>(
     space: &Space<D>,
     values: Cow<'v, [[f64; N]]>,
@@ -479,8 +485,8 @@ pub fn at_equally_spaced<'v, const D: usize, const N: usize>(
 pub(crate) mod sample {
     use super::*;
 
-    /// Make the space of a cube with `n` cells in each direction, which are divided into simplices that share one diagonal. The
-    /// coordinates are skewed.
+    /// Make the space of a cube with `n` cells in each direction, which are divided into simplices that share one
+    /// diagonal. The coordinates are skewed.
     pub fn block<const D: usize>(n: usize, order: Order) -> Space<D> {
         let count = 2 * n + 1;
         let number = |at: [usize; D]| at.iter().rev().fold(0, |sum, &k| sum * count + k) as u32;

@@ -9,8 +9,8 @@ use std::rc::Rc;
 
 /// A body with several nodes in place of each one at which its material jumps, one for each material there.
 ///
-/// Strains and stresses jump with the material. So means over the cells around a node, and polynomials fitted to them, belong to one of these
-/// nodes and to the cells of one material.
+/// Strains and stresses jump with the material. So means over the cells around a node, and polynomials fitted to them,
+/// belong to one of these nodes and to the cells of one material.
 pub struct Split<const D: usize> {
     whole: Rc<Space<D>>,
     /// The nodes and cells after the cut. Cells have the same order as in the body.
@@ -22,8 +22,9 @@ pub struct Split<const D: usize> {
 /// Share of a stiffness by which it changes where a material jumps.
 const JUMP: f64 = 1e-3;
 
-/// Distance from a node, as a share of that to the middle of a cell, at which the material of the cell is looked up. An elasticity that changes
-/// smoothly, be it by the factor e^100 within a cell, differs by less than [`JUMP`] between the cells around a node.
+/// Distance from a node, as a share of that to the middle of a cell, at which the material of the cell is looked up. An
+/// elasticity that changes smoothly, be it by the factor e^100 within a cell, differs by less than [`JUMP`] between the
+/// cells around a node.
 const BESIDE: f64 = 1e-6;
 
 impl<const D: usize> Split<D> {
@@ -161,7 +162,8 @@ mod tests {
     use crate::problem::order::Order;
     use crate::problem::{BodySpec, Plane};
 
-    /// Nodes at the interface of two materials are two nodes, those of facets are of the cells there, and equal materials have no interface.
+    /// Nodes at the interface of two materials are two nodes, those of facets are of the cells there, and equal
+    /// materials have no interface.
     #[test]
     fn nodes_at_an_interface_are_one_for_each_material() {
         for (order, upper) in [(Order::P1, 3.0), (Order::P2, 3.0), (Order::P2, 2.0)] {

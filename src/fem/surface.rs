@@ -7,13 +7,14 @@ use super::frame::place;
 use super::length;
 use super::space::Space;
 
-/// Return the quadrature rule of loads and springs on the surface of a body. It has ten degrees more than constant loads need: of a bell exp(-(s/r)^2)
-/// with r a third of a linear facet it loses 1e-5 in place of a fifth.
+/// Return the quadrature rule of loads and springs on the surface of a body. It has ten degrees more than constant
+/// loads need: of a bell exp(-(s/r)^2) with r a third of a linear facet it loses 1e-5 in place of a fifth.
 pub fn rule<const D: usize>(space: &Space<D>) -> Rule {
     element::rule(D, 2 * space.order.degree() + 11)
 }
 
-/// Return the nodal forces of a surface load. `traction(x, n)` is the force per area at a point x with outer unit normal n.
+/// Return the nodal forces of a surface load. `traction(x, n)` is the force per area at a point x with outer unit
+/// normal n.
 pub fn surface_load<const D: usize>(
     space: &Space<D>,
     facets: &Facets<D>,
@@ -61,8 +62,8 @@ fn visit<const D: usize>(space: &Space<D>, facets: &Facets<D>, rule: &Rule, mut 
     }
 }
 
-/// Return the springs of a foundation on a surface. `stiffness(x, n)` is the traction per displacement at a point x with outer unit
-/// normal n.
+/// Return the springs of a foundation on a surface. `stiffness(x, n)` is the traction per displacement at a point x
+/// with outer unit normal n.
 pub fn foundation<const D: usize>(
     space: &Space<D>,
     facets: &Facets<D>,

@@ -57,7 +57,8 @@ fn matrices_displacements_and_forces_belong_together() {
     }
 }
 
-/// A force at the centre and a moment about it do the work of both on a rigid motion about the centre, as forces at nodes and at dofs.
+/// A force at the centre and a moment about it do the work of both on a rigid motion about the centre, as forces at
+/// nodes and at dofs.
 fn work<const D: usize>(moment: [f64; 3]) {
     let centre = std::array::from_fn(|c| 0.4 + 0.1 * c as f64);
     let (space, frame) = turning::<D>(Order::P2);

@@ -1,5 +1,5 @@
-//! Symmetric positive semidefinite matrices of small dense blocks, one row of blocks per body, and their factor, which gives a solution of A x = b and a
-//! basis of the kernel.
+//! Symmetric positive semidefinite matrices of small dense blocks, one row of blocks per body, and their factor, which
+//! gives a solution of A x = b and a basis of the kernel.
 
 use nalgebra::{DMatrix, DVector};
 use std::cell::RefCell;
@@ -7,32 +7,39 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::rc::Rc;
 
-/// Relative stiffness below which a motion counts as free: the one tolerance that decides which motions are unconstrained.
+/// Relative stiffness below which a motion counts as free: the one tolerance that decides which motions are
+/// unconstrained.
 ///
-/// Let A be the springs in terms of motions whose largest displacement is about one, scaled to ones on its diagonal. A motion e is free if
-/// e'Ae <= TOLERANCE e'e. Here e'e is what the springs would store if every unknown of e moved alone; compared with it, they store nothing. Both sides
-/// are quadratic: a free motion closes less than 3e-7 of what its parts close.
+/// Let A be the springs in terms of motions whose largest displacement is about one, scaled to ones on its diagonal. A
+/// motion e is free if e'Ae <= TOLERANCE e'e. Here e'e is what the springs would store if every unknown of e moved
+/// alone; compared with it, they store nothing. Both sides are quadratic: a free motion closes less than 3e-7 of what
+/// its parts close.
 ///
-/// - Why the tolerance is not less. An entry of A is a sum of products, each rounded by eps = 1.1e-16 of itself. The elimination of k unknowns changes
-///   it by at most (k + 1) eps again (Higham, Accuracy and Stability of Numerical Algorithms, theorem 10.3), where k counts the unknowns of the bodies
-///   around, some hundreds at most. So e'Ae/e'e of a true kernel is rounded to 1e-14 at worst. Measured are 1e-16 on a wall of 64 x 64 blocks and 8e-17
-///   on 1000 blocks in space. Coordinates in mesh files have 16 digits or, on curved surfaces, some ten. Closings have that error, and A its square.
-/// - Why it is not more. Everything above is real. A chain of n bodies that is held at one end has e'Ae/e'e = 1/n^2, springs of 1 beside those of 1e8
-///   have 1e-8, and both may occur together.
-/// - Why it refers to e'e, not to the pivot alone. A pivot is e'Ae for the e that is one at its own unknown. If that is the rotation of a single block,
-///   all others move by their distance, and their rounding errors grow with it: the pivot is 2.5e-9 on that wall, and e'e is 2.4e7.
+/// - Why the tolerance is not less. An entry of A is a sum of products, each rounded by eps = 1.1e-16 of itself. The
+///   elimination of k unknowns changes it by at most (k + 1) eps again (Higham, Accuracy and Stability of Numerical
+///   Algorithms, theorem 10.3), where k counts the unknowns of the bodies around, some hundreds at most. So e'Ae/e'e of
+///   a true kernel is rounded to 1e-14 at worst. Measured are 1e-16 on a wall of 64 x 64 blocks and 8e-17 on 1000
+///   blocks in space. Coordinates in mesh files have 16 digits or, on curved surfaces, some ten. Closings have that
+///   error, and A its square.
+/// - Why it is not more. Everything above is real. A chain of n bodies that is held at one end has e'Ae/e'e = 1/n^2,
+///   springs of 1 beside those of 1e8 have 1e-8, and both may occur together.
+/// - Why it refers to e'e, not to the pivot alone. A pivot is e'Ae for the e that is one at its own unknown. If that is
+///   the rotation of a single block, all others move by their distance, and their rounding errors grow with it: the
+///   pivot is 2.5e-9 on that wall, and e'e is 2.4e7.
 pub const TOLERANCE: f64 = 1e-13;
 
-/// Share of the largest part of a free motion below which a part is rounding. A motion is known to the root of [`TOLERANCE`], 3e-7, and less accurately
-/// where springs differ much. Other quantities that are rounded more than once count as zero below this share, too.
+/// Share of the largest part of a free motion below which a part is rounding. A motion is known to the root of
+/// [`TOLERANCE`], 3e-7, and less accurately where springs differ much. Other quantities that are rounded more than once
+/// count as zero below this share, too.
 pub const PART: f64 = 1e-6;
 
-/// The factorisation LDL' of a symmetric positive semidefinite matrix. Unknowns are scaled to ones on the diagonal. Bodies are in an order of minimum
-/// degree, and the unknowns of a body are eliminated by their pivots, largest first.
+/// The factorisation LDL' of a symmetric positive semidefinite matrix. Unknowns are scaled to ones on the diagonal.
+/// Bodies are in an order of minimum degree, and the unknowns of a body are eliminated by their pivots, largest first.
 ///
-/// A pivot d belongs to a vector e that is one at its unknown and zero at the unknowns that are not eliminated yet; its other entries make e'Ae = d
-/// least. If e'Ae <= tolerance e'e, then e is in the kernel, and the unknown is left out: the matrix of the others is regular. An unknown is also left
-/// out if its diagonal entry is below tolerance^2 of the largest in its block, the square of a rounded number.
+/// A pivot d belongs to a vector e that is one at its unknown and zero at the unknowns that are not eliminated yet; its
+/// other entries make e'Ae = d least. If e'Ae <= tolerance e'e, then e is in the kernel, and the unknown is left out:
+/// the matrix of the others is regular. An unknown is also left out if its diagonal entry is below tolerance^2 of the
+/// largest in its block, the square of a rounded number.
 #[derive(Debug, Clone)]
 pub struct Factor {
     /// Number of unknowns.
@@ -143,7 +150,8 @@ impl Factor {
         self.columns[k].panel = panel;
     }
 
-    /// Subtract from column k the change by the elimination of column j < k, in which k is at `position` of the columns below.
+    /// Subtract from column k the change by the elimination of column j < k, in which k is at `position` of the columns
+    /// below.
     fn update(&mut self, k: usize, j: usize, position: usize, work: &mut WorkArrays) {
         let (before, rest) = self.columns.split_at_mut(k);
         let (source, target) = (&before[j], &mut rest[0]);
@@ -194,8 +202,8 @@ impl Factor {
         }) {
             let p = open.remove(at);
             let pivot = self.columns[k].panel[p * (height + 1)];
-            // a pivot of the kernel is about eps e'e, and e'e of a rotation is about the square of the number of bodies: below this bound for up to
-            // 5e4 bodies
+            // a pivot of the kernel is about eps e'e, and e'e of a rotation is about the square of the number of
+            // bodies: below this bound for up to 5e4 bodies
             if pivot <= tolerance.sqrt() {
                 let vector = self.candidate(k, p, earlier, work);
                 let size: f64 = vector.iter().map(|(_, value)| value * value).sum();
@@ -233,8 +241,8 @@ impl Factor {
         self.left_out.push(unknown);
     }
 
-    /// Return the vector e of a pivot of the scaled matrix: one at unknown p of column k, zero at the unknowns that are not eliminated yet, and with
-    /// the least e'Ae. Its entries are (unknown, value).
+    /// Return the vector e of a pivot of the scaled matrix: one at unknown p of column k, zero at the unknowns that are
+    /// not eliminated yet, and with the least e'Ae. Its entries are (unknown, value).
     fn candidate(
         &self,
         k: usize,
@@ -275,8 +283,8 @@ impl Factor {
         &self.left_out
     }
 
-    /// Return a basis of the kernel, with the largest entry one. The basis is reduced: each vector is zero at all unknowns left out but its own. So
-    /// pure motions are found as such.
+    /// Return a basis of the kernel, with the largest entry one. The basis is reduced: each vector is zero at all
+    /// unknowns left out but its own. So pure motions are found as such.
     pub fn kernel(&self) -> Vec<DVector<f64>> {
         let whole = |entries: &Vec<(usize, f64)>| {
             let mut vector = DVector::zeros(self.count);
@@ -286,8 +294,8 @@ impl Factor {
         self.kernel.iter().map(whole).collect()
     }
 
-    /// Return the solution of A x = b that is zero at the unknowns left out. If b is not in the range of A, the equations of these unknowns are not
-    /// satisfied.
+    /// Return the solution of A x = b that is zero at the unknowns left out. If b is not in the range of A, the
+    /// equations of these unknowns are not satisfied.
     pub fn solve(&self, b: &DVector<f64>) -> DVector<f64> {
         let mut x: Vec<f64> = b.iter().zip(&self.scale).map(|(b, scale)| b * scale).collect();
         for column in &self.columns {
@@ -317,14 +325,16 @@ impl Blocks {
         Factor::new(self, unit_diagonal(self), TOLERANCE)
     }
 
-    /// Factor the matrix without scaling. The kernel has the combinations e of all unknowns with e'Ae <= `tolerance * e'e`. If the matrix is indefinite, they
-    /// are as many as make the matrix of the unknowns that are not left out definite.
+    /// Factor the matrix without scaling. The kernel has the combinations e of all unknowns with e'Ae <= `tolerance *
+    /// e'e`. If the matrix is indefinite, they are as many as make the matrix of the unknowns that are not left out
+    /// definite.
     pub fn factor_unscaled(&self, tolerance: f64) -> Factor {
         Factor::new(self, vec![1.0; self.unknowns()], tolerance)
     }
 
-    /// Return a basis of the combinations e of a few motions with e'Ae <= `tolerance * full * e'e`. `full` is the entry of a motion that is fully
-    /// constrained; small entries have no such scale of their own. Pure motions are found as such, with the largest part one.
+    /// Return a basis of the combinations e of a few motions with e'Ae <= `tolerance * full * e'e`. `full` is the entry
+    /// of a motion that is fully constrained; small entries have no such scale of their own. Pure motions are found as
+    /// such, with the largest part one.
     pub fn free(gram: &DMatrix<f64>, full: f64, tolerance: f64) -> Vec<DVector<f64>> {
         let scale = vec![full.sqrt().recip(); gram.nrows()];
         Factor::new(&Self::single(gram), scale, tolerance).kernel()
@@ -478,8 +488,8 @@ thread_local! {
     static LAST: RefCell<(Vec<Vec<usize>>, EliminationOrder)> = RefCell::default();
 }
 
-/// Return [`order`] of a graph; it is kept for the next call with the same graph. A run factors the springs between its bodies some ten times,
-/// and the order takes a third as long as the factor.
+/// Return [`order`] of a graph; it is kept for the next call with the same graph. A run factors the springs between its
+/// bodies some ten times, and the order takes a third as long as the factor.
 pub fn order_again(graph: Vec<Vec<usize>>) -> EliminationOrder {
     // a single vertex does not replace the graph that is kept
     if graph.len() < 2 {
@@ -496,9 +506,9 @@ pub fn order_again(graph: Vec<Vec<usize>>) -> EliminationOrder {
 
 /// Return the vertices in the order of their elimination, each with its neighbours at that time.
 ///
-/// `graph` has the neighbours of each vertex, sorted, without the vertex itself. Every step eliminates the first vertex of least degree, and connects
-/// its neighbours to each other (George, Liu: The evolution of the minimum degree ordering algorithm, 1989). The graph is explicit, because it is
-/// small: one vertex per body.
+/// `graph` has the neighbours of each vertex, sorted, without the vertex itself. Every step eliminates the first vertex
+/// of least degree, and connects its neighbours to each other (George, Liu: The evolution of the minimum degree
+/// ordering algorithm, 1989). The graph is explicit, because it is small: one vertex per body.
 pub fn order(mut graph: Vec<Vec<usize>>) -> Vec<(usize, Vec<usize>)> {
     let mut queue: BTreeSet<(usize, usize)> = graph.iter().enumerate().map(|(v, near)| (near.len(), v)).collect();
     let mut order = Vec::with_capacity(graph.len());

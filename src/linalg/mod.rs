@@ -1,7 +1,8 @@
-//! Linear algebra: sparse matrices in compressed rows, matrices of blocks with their factor, and functions that are the same on all processors.
+//! Linear algebra: sparse matrices in compressed rows, matrices of blocks with their factor, and functions that are the
+//! same on all processors.
 //!
-//! Dense algebra comes from `nalgebra`. The sparse type is our own because its index type must be PETSc's 32-bit integer, so that a pattern can be
-//! passed to PETSc without a copy.
+//! Dense algebra comes from `nalgebra`. The sparse type is our own because its index type must be PETSc's 32-bit
+//! integer, so that a pattern can be passed to PETSc without a copy.
 
 use crate::error::{Error, Kind, Result};
 pub use factor::{Blocks, Factor, PART, TOLERANCE};
@@ -12,13 +13,15 @@ mod factor;
 
 /// Powers, exponentials and the like with the same last digit on all processors.
 ///
-/// The C library has several versions of each function and chooses one for the processor. Every rank evaluates the laws of all contact points. On
-/// processors of two kinds, ranks would decide differently near a tolerance, and wait for each other for ever.
+/// The C library has several versions of each function and chooses one for the processor. Every rank evaluates the laws
+/// of all contact points. On processors of two kinds, ranks would decide differently near a tolerance, and wait for
+/// each other for ever.
 pub mod portable {
     pub use libm::{acos, asin, atan, atan2, cos, cosh, exp, hypot, log, log2, log10, pow, sin, sinh, tan, tanh};
 }
 
-/// Return the least and the largest coordinates of points: the corners of their bounding box. Without points the least ones are infinite.
+/// Return the least and the largest coordinates of points: the corners of their bounding box. Without points the least
+/// ones are infinite.
 pub fn bounds<const K: usize>(points: impl IntoIterator<Item = [f64; K]>) -> [[f64; K]; 2] {
     points.into_iter().fold([[f64::INFINITY; K], [f64::NEG_INFINITY; K]], |all, x| around(all, [x; 2]))
 }
@@ -204,7 +207,8 @@ pub fn dot(x: &[f64], y: &[f64]) -> f64 {
     x.iter().zip(y).map(|(x, y)| x * y).sum()
 }
 
-/// Return the weights of the values at some points of a line in the value at `x` of the polynomial through them (Lagrange). The points are distinct.
+/// Return the weights of the values at some points of a line in the value at `x` of the polynomial through them
+/// (Lagrange). The points are distinct.
 pub fn interpolation_weights(at: &[f64], x: f64) -> impl Iterator<Item = f64> + '_ {
     let weight = move |(i, own): (usize, &f64)| {
         at.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, other)| (x - other) / (own - other)).product()
@@ -238,7 +242,8 @@ pub fn fit<V: AsRef<[f64]>>(vectors: &[V], to: &[f64]) -> Vec<f64> {
     }
 }
 
-/// A sum with the rounding errors of its additions. The rounded total of both is the same in any order of the terms, but for rare last digits.
+/// A sum with the rounding errors of its additions. The rounded total of both is the same in any order of the terms,
+/// but for rare last digits.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub struct Total {
     sum: f64,
@@ -299,7 +304,8 @@ impl DisjointSets {
         self.0[a.max(b) as usize] = a.min(b);
     }
 
-    /// Return the number of sets, and the index of the set of each thing. Sets are numbered in the order of their first things.
+    /// Return the number of sets, and the index of the set of each thing. Sets are numbered in the order of their first
+    /// things.
     pub fn classes(mut self) -> (usize, Vec<u32>) {
         let mut of_thing: Vec<u32> = vec![0; self.0.len()];
         let mut count = 0;

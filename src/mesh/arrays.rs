@@ -9,11 +9,13 @@ use std::path::Path;
 /// Name in messages, where meshes from files have their path.
 const NAME: &str = "mesh arrays";
 
-/// Return the mesh of these arrays, with cells turned to positive volume. Points keep their numbers. A mesh of order 1 gets straight edges with middles if `order` is above.
+/// Return the mesh of these arrays, with cells turned to positive volume. Points keep their numbers. A mesh of order 1
+/// gets straight edges with middles if `order` is above.
 ///
 /// # Errors
-/// A coordinate is not finite, or a point is off the plane if `D` is 2. A group has no name or no simplices, or two groups have
-/// the same name. A group has numbers of points that do not exist, simplices without extent, or a dimension above `D`.
+/// A coordinate is not finite, or a point is off the plane if `D` is 2. A group has no name or no simplices, or two
+/// groups have the same name. A group has numbers of points that do not exist, simplices without extent, or a dimension
+/// above `D`.
 pub fn mesh<const D: usize>(arrays: &MeshArrays, order: Order) -> Result<Mesh<D>> {
     let MeshArrays { points, order: own, groups } = arrays;
     if *own > Order::highest(D) {

@@ -5,14 +5,14 @@ use super::Mesh;
 /// Share of the largest radius that rounding of a mesher leaves on the axis.
 const ROUNDING: f64 = 1e-10;
 
-/// Radius of a hole, in edges of the cells around it, below which the body is solid. The hole changes stresses within some of its
-/// radii, and the energy of the cells by the square of this ratio, 1e-6. Cells of that size do not show the hole; their stress at
-/// its edge, a displacement over the radius, is meaningless.
+/// Radius of a hole, in edges of the cells around it, below which the body is solid. The hole changes stresses within
+/// some of its radii, and the energy of the cells by the square of this ratio, 1e-6. Cells of that size do not show the
+/// hole; their stress at its edge, a displacement over the radius, is meaningless.
 const HOLE: f64 = 1e-3;
 
 impl<const D: usize> Mesh<D> {
-    /// Put the nodes beside the axis x = 0 on it: those nearer than the uncertainty of coordinates, and those around a hole that
-    /// the cells do not show. Return a warning for the latter.
+    /// Put the nodes beside the axis x = 0 on it: those nearer than the uncertainty of coordinates, and those around a
+    /// hole that the cells do not show. Return a warning for the latter.
     pub fn close_axis(&mut self) -> Option<String> {
         let largest = self.points.iter().fold(0.0, |largest: f64, x| largest.max(x[0].abs()));
         let uncertain = self.uncertainty.max(ROUNDING * largest);

@@ -81,12 +81,11 @@ impl<const D: usize> MeshBuilder<D> {
             let help = "rename one: a name alone must tell which group is meant";
             return Err(Flaw::new(format!("two physical groups are named `{name}`"), help));
         }
-        match self.group_of.contains_key(&(dimension, tag)) {
-            true => Err(Flaw::new(format!("two names for physical {lower} {tag}"), DAMAGED)),
-            false => {
-                self.add_group(dimension, tag, name.to_owned());
-                Ok(())
-            }
+        if self.group_of.contains_key(&(dimension, tag)) {
+            Err(Flaw::new(format!("two names for physical {lower} {tag}"), DAMAGED))
+        } else {
+            self.add_group(dimension, tag, name.to_owned());
+            Ok(())
         }
     }
 
@@ -151,9 +150,10 @@ impl<const D: usize> MeshBuilder<D> {
             return Err(Flaw::new(what, ORDERS));
         }
         let Some(order) = kind.order else { return Ok(()) };
-        match self.orders[kind.shape.dimension].get_or_insert((order, group)).0 == order {
-            true => Ok(()),
-            false => Err(other_order(name)),
+        if self.orders[kind.shape.dimension].get_or_insert((order, group)).0 == order {
+            Ok(())
+        } else {
+            Err(other_order(name))
         }
     }
 
@@ -180,12 +180,11 @@ impl<const D: usize> MeshBuilder<D> {
             self.check_plane(&own, nodes, first)?;
         }
         self.split += usize::from(kind.is_divided());
-        let mut simplices = match kind.is_divided() {
-            true => Middles { points: &mut self.points, known: &mut self.middles }.simplices(kind, &own),
-            false => {
-                kind.reorder(&mut own);
-                own
-            }
+        let mut simplices = if kind.is_divided() {
+            Middles { points: &mut self.points, known: &mut self.middles }.simplices(kind, &own)
+        } else {
+            kind.reorder(&mut own);
+            own
         };
         let (dimension, stride) = (kind.shape.dimension, simplex::stride(kind.shape.dimension, kind.order));
         for simplex in simplices.chunks_exact_mut(stride) {

@@ -1,15 +1,16 @@
 //! The cache of meshes that Gmsh made: one file for each combination of script, numbers, order, dimension, algorithm
 //! and Gmsh. Its name is a digest of these.
 //!
-//! Where there is no Gmsh, the newest mesh of the other inputs serves: the login node of a cluster meshes, and its other nodes solve.
+//! Where there is no Gmsh, the newest mesh of the other inputs serves: the login node of a cluster meshes, and its
+//! other nodes solve.
 
 use crate::error::{Error, Kind, Result};
 use crate::file::digest;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// Return what the name of a mesh with these inputs begins with: the name of its script, and a digest. Behind it stands the Gmsh that made the
-/// mesh. The digest includes a version, which changes with the way this program calls Gmsh.
+/// Return what the name of a mesh with these inputs begins with: the name of its script, and a digest. Behind it stands
+/// the Gmsh that made the mesh. The digest includes a version, which changes with the way this program calls Gmsh.
 pub fn name(made_from: impl Serialize, path: &Path) -> String {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     // a prefix of 128 bits is long enough
@@ -55,8 +56,9 @@ impl Cache {
         self.folder.join(name)
     }
 
-    /// Make the file of this name, over an older one, and return what `make` returns. It gets a folder to work in and the path of the file that
-    /// it must write there. The finished file is renamed, so that nobody ever reads half a file.
+    /// Make the file of this name, over an older one, and return what `make` returns. It gets a folder to work in and
+    /// the path of the file that it must write there. The finished file is renamed, so that nobody ever reads half a
+    /// file.
     ///
     /// # Errors
     /// Those of `make`, and folders that cannot be written.

@@ -1,22 +1,22 @@
 //! The point from which the coordinates of a mesh are measured, if the mesh lies far from the origin of its scene.
 //!
-//! A coordinate of size X has an absolute error of eps X, where eps is the relative rounding error. Differences of coordinates
-//! are exact or nearly so. Products, interpolations and sums of coordinates round relative to X, not to the size of the body.
-//! The datum lies near the mesh and is subtracted once, where the mesh is loaded. All of these then round relative to the size
-//! of the mesh. Coordinates of the scene return in expressions and in output alone.
+//! A coordinate of size X has an absolute error of eps X, where eps is the relative rounding error. Differences of
+//! coordinates are exact or nearly so. Products, interpolations and sums of coordinates round relative to X, not to the
+//! size of the body. The datum lies near the mesh and is subtracted once, where the mesh is loaded. All of these then
+//! round relative to the size of the mesh. Coordinates of the scene return in expressions and in output alone.
 
 use crate::linalg::bounds;
 
-/// Distance of the centre of a mesh from the origin, in sizes of the mesh, below which the mesh keeps its coordinates. At most
-/// three bits are lost there, and the numbers of scenes near the origin do not change.
+/// Distance of the centre of a mesh from the origin, in sizes of the mesh, below which the mesh keeps its coordinates.
+/// At most three bits are lost there, and the numbers of scenes near the origin do not change.
 const FAR: f64 = 4.0;
 
-/// Return the datum for points in a box `[low, high]`. Along each axis it is zero, or a point near the middle of the box if the
-/// origin is far away. `along` tells along which axes the origin may move: in a body of revolution the radius is measured from
-/// the axis.
+/// Return the datum for points in a box `[low, high]`. Along each axis it is zero, or a point near the middle of the
+/// box if the origin is far away. `along` tells along which axes the origin may move: in a body of revolution the
+/// radius is measured from the axis.
 ///
-/// The datum is a multiple of a power of two that does not exceed the size of the box. Coordinates are multiples of a smaller
-/// power, or have no digits within the box. The datum is therefore subtracted and added again without error.
+/// The datum is a multiple of a power of two that does not exceed the size of the box. Coordinates are multiples of a
+/// smaller power, or have no digits within the box. The datum is therefore subtracted and added again without error.
 pub fn of<const D: usize>([low, high]: [[f64; 3]; 2], along: [bool; D]) -> [f64; D] {
     let size = (0..D).map(|c| high[c] - low[c]).fold(0.0, f64::max);
     let unit = size.log2().floor().exp2();
@@ -42,7 +42,8 @@ pub fn rounding<'a, const D: usize>(datum: &[f64; D], points: impl IntoIterator<
 mod tests {
     use super::*;
 
-    /// Near the origin nothing moves. Far away the datum is near the middle, and every coordinate is recovered to the last bit.
+    /// Near the origin nothing moves. Far away the datum is near the middle, and every coordinate is recovered to the
+    /// last bit.
     #[test]
     fn a_datum_is_exact() {
         let near = [[-1.0, 3.0, 0.0], [1.0, 5.0, 2.0]];

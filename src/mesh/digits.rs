@@ -1,20 +1,20 @@
 //! The uncertainty of coordinates, as the digits of a mesh show it.
 //!
-//! Many files have coordinates of 6 to 9 decimal digits, or of single precision. Such a coordinate is known to half a unit of its
-//! last digit. What the coordinates tell of a mesh is uncertain by that: whether a facet belongs to a plane, whether a node lies
-//! on an axis, whether two surfaces touch.
+//! Many files have coordinates of 6 to 9 decimal digits, or of single precision. Such a coordinate is known to half a
+//! unit of its last digit. What the coordinates tell of a mesh is uncertain by that: whether a facet belongs to a
+//! plane, whether a node lies on an axis, whether two surfaces touch.
 
 use std::fmt::Write;
 
-/// Fewest decimal digits that a program writes of a coordinate by default: those of `%g` in C. Numbers of fewer digits are those
-/// that a person has drawn, and exact.
+/// Fewest decimal digits that a program writes of a coordinate by default: those of `%g` in C. Numbers of fewer digits
+/// are those that a person has drawn, and exact.
 const LEAST: usize = 6;
 
 /// Decimal digits from which a coordinate may have all digits of a double.
 const ALL: usize = 16;
 
-/// Share of the different coordinates that have all digits of the mesh, or one less. Among rounded numbers it is 0.99, and among
-/// drawn ones it is small. Both occur together where some faces are at drawn coordinates.
+/// Share of the different coordinates that have all digits of the mesh, or one less. Among rounded numbers it is 0.99,
+/// and among drawn ones it is small. Both occur together where some faces are at drawn coordinates.
 const ROUNDED: f64 = 0.5;
 
 /// Binary digits of single precision.
@@ -23,8 +23,9 @@ const SINGLE: u32 = f32::MANTISSA_DIGITS;
 /// Binary digits up to which numbers are exact: the multiples of 1/1024 on a mesh of 1024 units, as grids have them.
 const GRID: u32 = 20;
 
-/// Return the uncertainty of coordinates: half a unit of the last digit of the largest one. It is zero if the coordinates have
-/// the digits of doubles, whose rounding [`datum::rounding`](super::datum::rounding) gives, or are exact.
+/// Return the uncertainty of coordinates: half a unit of the last digit of the largest one. It is zero if the
+/// coordinates have the digits of doubles, whose rounding [`datum::rounding`](super::datum::rounding) gives, or are
+/// exact.
 pub fn uncertainty<const D: usize>(points: &[[f64; D]]) -> f64 {
     let values = || points.iter().flatten().map(|x| x.abs()).filter(|x| *x > 0.0 && x.is_finite());
     let largest = values().fold(0.0, f64::max);
@@ -72,8 +73,8 @@ fn decimal_digits(x: f64, text: &mut String) -> usize {
     text.bytes().take_while(|byte| *byte != b'e').filter(u8::is_ascii_digit).count()
 }
 
-/// Return whether a number is one of single precision, as printed with this number of decimal places in scientific notation, or
-/// with as few as give it.
+/// Return whether a number is one of single precision, as printed with this number of decimal places in scientific
+/// notation, or with as few as give it.
 fn is_printed(x: f64, places: Option<usize>) -> bool {
     let single = x as f32;
     let text = match places {

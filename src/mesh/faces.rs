@@ -37,7 +37,8 @@ impl<'a, const D: usize> Simplices<'a, D> {
     }
 }
 
-/// Corners of a cell of positive volume on the face opposite each of its corners, in the order in which the normal points outwards.
+/// Corners of a cell of positive volume on the face opposite each of its corners, in the order in which the normal
+/// points outwards.
 const OUTWARD: [&[[usize; 3]]; 2] = [&[[1, 2, 0], [2, 0, 0], [0, 1, 0]], &[[1, 2, 3], [2, 0, 3], [0, 1, 3], [1, 0, 2]]];
 
 /// A face of a cell.
@@ -63,8 +64,8 @@ impl<const D: usize> Face<D> {
         self.place as usize % 4
     }
 
-    /// Return the corners, sorted. Return also whether the permutation to the order in which the normal points out of the cell
-    /// is odd.
+    /// Return the corners, sorted. Return also whether the permutation to the order in which the normal points out of
+    /// the cell is odd.
     pub fn sorted(self, cells: Simplices<D>) -> ([u32; D], bool) {
         let (mut key, mut odd) = (self.corners().map(|i| cells.cell(self.cell())[i]), false);
         for end in (1..D).rev() {
@@ -92,8 +93,8 @@ impl<const D: usize> Face<D> {
     }
 }
 
-/// All faces of the cells of a body, each with its sorted corners, ordered by these. The list has D + 1 faces per cell, which is most of the memory
-/// of a check.
+/// All faces of the cells of a body, each with its sorted corners, ordered by these. The list has D + 1 faces per cell,
+/// which is most of the memory of a check.
 pub struct Faces<const D: usize>(Vec<([u32; D], Face<D>)>);
 
 impl<const D: usize> Faces<D> {

@@ -23,8 +23,8 @@ pub fn is_mesh(path: &Path, bytes: &[u8]) -> bool {
 
 /// Write a script into the folder `work` that loads the shape in a file and names its groups, and return its path.
 ///
-/// Every volume, surface and point becomes a group with a name of its kind and number. In the plane these are surfaces, curves
-/// and points. Elements have the given `size`, if there is one.
+/// Every volume, surface and point becomes a group with a name of its kind and number. In the plane these are surfaces,
+/// curves and points. Elements have the given `size`, if there is one.
 ///
 /// # Errors
 /// The folder cannot be written.
@@ -61,16 +61,15 @@ pub fn is_input_file(path: &Path) -> bool {
     is_kind(path, &["inp"])
 }
 
-/// Copy a mesh of another program into the folder `work`, and return the path of the copy. Gmsh chooses its reader by the name, and reads files
-/// beside a mesh as scripts, so that the copy has a name of our own. A file of no other kind begins like a mesh of Gmsh.
+/// Copy a mesh of another program into the folder `work`, and return the path of the copy. Gmsh chooses its reader by
+/// the name, and reads files beside a mesh as scripts, so that the copy has a name of our own. A file of no other kind
+/// begins like a mesh of Gmsh.
 ///
 /// # Errors
-/// A deck or universal file uses local systems of coordinates, which Gmsh ignores without a word. The folder cannot be written.
+/// A deck or universal file uses local systems of coordinates, which Gmsh ignores without a word. The folder cannot be
+/// written.
 pub fn copied(file: &Located<PathBuf>, bytes: &[u8], work: &Path) -> Result<PathBuf> {
-    let kind = match is_kind(&file.value, &MESHES) {
-        true => ending(&file.value),
-        false => "msh".to_owned(),
-    };
+    let kind = if is_kind(&file.value, &MESHES) { ending(&file.value) } else { "msh".to_owned() };
     match kind.as_str() {
         "bdf" | "nas" => refuse_local_systems(file, bytes)?,
         "unv" => refuse_turned_systems(file, bytes)?,
@@ -82,8 +81,9 @@ pub fn copied(file: &Located<PathBuf>, bytes: &[u8], work: &Path) -> Result<Path
 
 /// Refuse a deck of Nastran with a grid point in a local system of coordinates.
 ///
-/// A point is in the system of its field CP, or where that is blank in that of `GRDSET`; 0 is the global system. Systems that no point names
-/// change nothing, and neither does the field CD: it turns displacements, supports and loads, which are not read.
+/// A point is in the system of its field CP, or where that is blank in that of `GRDSET`; 0 is the global system.
+/// Systems that no point names change nothing, and neither does the field CD: it turns displacements, supports and
+/// loads, which are not read.
 fn refuse_local_systems(file: &Located<PathBuf>, bytes: &[u8]) -> Result<()> {
     let text = String::from_utf8_lossy(bytes);
     let usual = text.lines().find_map(|line| system(line, "GRDSET")).unwrap_or_default();
@@ -101,7 +101,8 @@ fn refuse_local_systems(file: &Located<PathBuf>, bytes: &[u8]) -> Result<()> {
     Ok(())
 }
 
-/// Return the field CP of a line of a deck with this card, in free, small or large fields; none if the line has another card.
+/// Return the field CP of a line of a deck with this card, in free, small or large fields; none if the line has another
+/// card.
 fn system<'a>(line: &'a str, card: &str) -> Option<&'a str> {
     let line = line.split('$').next().unwrap_or_default();
     let (name, field) = if line.contains(',') {
@@ -116,7 +117,8 @@ fn system<'a>(line: &'a str, card: &str) -> Option<&'a str> {
     name.eq_ignore_ascii_case(card).then(|| field.unwrap_or_default().trim())
 }
 
-/// Refuse a universal file with a node in a local system of coordinates: one of dataset 2420 that is not rectangular, or turned or moved.
+/// Refuse a universal file with a node in a local system of coordinates: one of dataset 2420 that is not rectangular,
+/// or turned or moved.
 fn refuse_turned_systems(file: &Located<PathBuf>, bytes: &[u8]) -> Result<()> {
     let text = String::from_utf8_lossy(bytes);
     let lines: Vec<&str> = text.lines().collect();

@@ -86,8 +86,8 @@ impl Gmsh {
         Gmsh::find().ok_or_else(missing)
     }
 
-    /// Return a text that distinguishes this Gmsh from others: its path, size and time of change. To ask for its version would
-    /// take longer than to read a mesh from the cache.
+    /// Return a text that distinguishes this Gmsh from others: its path, size and time of change. To ask for its
+    /// version would take longer than to read a mesh from the cache.
     pub fn identity(&self) -> String {
         let data = std::fs::metadata(&self.program).ok();
         let time = data.as_ref().and_then(|data| data.modified().ok()?.duration_since(UNIX_EPOCH).ok());
@@ -105,12 +105,12 @@ impl Gmsh {
 
     /// Mesh a script into the file `output`. A signal ends Gmsh and gives an error.
     ///
-    /// `home` is an empty folder that Gmsh reads instead of the user's own Gmsh options, which would change meshes without a
-    /// change of the key in the cache.
+    /// `home` is an empty folder that Gmsh reads instead of the user's own Gmsh options, which would change meshes
+    /// without a change of the key in the cache.
     ///
     /// # Errors
-    /// Gmsh fails; its own messages are the causes. It exceeds its limit of time. A signal, or a limit on the size of files, ends
-    /// it.
+    /// Gmsh fails; its own messages are the causes. It exceeds its limit of time. A signal, or a limit on the size of
+    /// files, ends it.
     pub fn run(&self, task: &MeshingTask, output: &Path, home: &Path) -> Result<()> {
         task.interrupt.hold();
         let cannot = |cause: &std::io::Error| Error::file(&self.program, "run", cause);
@@ -146,7 +146,8 @@ impl Gmsh {
         task.interrupt.release()
     }
 
-    /// Return the command that meshes a script. A tool of util-linux, where it is there, lets the system end Gmsh with this program.
+    /// Return the command that meshes a script. A tool of util-linux, where it is there, lets the system end Gmsh with
+    /// this program.
     fn command(&self, task: &MeshingTask, output: &Path, home: &Path) -> Result<Command> {
         let mut command = match find("setpriv") {
             Some(tool) => {
@@ -156,9 +157,10 @@ impl Gmsh {
             }
             None => Command::new(&self.program),
         };
-        match task.is_mesh {
-            true => command.arg("-save"),
-            false => command.arg(format!("-{}", task.dimension)).args(["-order", &task.order.degree().to_string()]),
+        if task.is_mesh {
+            command.arg("-save")
+        } else {
+            command.arg(format!("-{}", task.dimension)).args(["-order", &task.order.degree().to_string()])
         };
         command.args(["-format", "msh41", "-bin", "-v", "2"]);
         if task.algorithm == Algorithm::Hxt {

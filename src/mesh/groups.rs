@@ -58,8 +58,8 @@ impl Groups {
         self.place(name).map(|place| &self.list[place])
     }
 
-    /// Return the index of the group with this name. If there is none, return that of the only group whose name has the same
-    /// plain form: `.inp` files have no capitals, for instance.
+    /// Return the index of the group with this name. If there is none, return that of the only group whose name has the
+    /// same plain form: `.inp` files have no capitals, for instance.
     pub fn place(&self, name: &str) -> Option<usize> {
         self.place.get(name).copied().or_else(|| self.plain.get(&plain(name)).copied().flatten())
     }
@@ -187,9 +187,9 @@ pub struct Numbering {
     node: Vec<u32>,
 }
 
-/// Largest ratio of the entries of a table to the corners of cells, counted in every cell. The table has an entry for every
-/// point between the first and the last one. About six cells meet at a node of triangles and 24 at one of tetrahedra, so the
-/// table is no larger than the cells.
+/// Largest ratio of the entries of a table to the corners of cells, counted in every cell. The table has an entry for
+/// every point between the first and the last one. About six cells meet at a node of triangles and 24 at one of
+/// tetrahedra, so the table is no larger than the cells.
 const SPARSE: usize = 2;
 
 impl Numbering {

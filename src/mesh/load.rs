@@ -140,9 +140,10 @@ const WINDOW: usize = 1 << 18;
 /// The file cannot be read, or is no mesh.
 pub fn as_msh(file: &Path, dimension: usize) -> Result<Vec<u8>> {
     let bytes = crate::file::read(file)?;
-    match foreign::is_input_file(file) {
-        true => abaqus::convert(file, &with_unix_lines(bytes), dimension).map(|converted| converted.mesh),
-        false => Ok(bytes),
+    if foreign::is_input_file(file) {
+        abaqus::convert(file, &with_unix_lines(bytes), dimension).map(|converted| converted.mesh)
+    } else {
+        Ok(bytes)
     }
 }
 
@@ -186,7 +187,8 @@ struct Wanted<'a> {
 }
 
 impl Wanted<'_> {
-    /// Return the mesh from the cache, or make it. `make` gets Gmsh, a folder to work in and the path of the file that it must write there.
+    /// Return the mesh from the cache, or make it. `make` gets Gmsh, a folder to work in and the path of the file that
+    /// it must write there.
     fn find_or_make<const D: usize>(
         &self,
         cache: &Cache,
@@ -312,15 +314,13 @@ impl Meshing<'_> {
         }
     }
 
-    /// Return the path of the script for Gmsh: the user's own, or one in the folder `work` that loads a shape, follows sizes, or includes a script whose
-    /// last line is not ended.
+    /// Return the path of the script for Gmsh: the user's own, or one in the folder `work` that loads a shape, follows
+    /// sizes, or includes a script whose last line is not ended.
     fn written<const D: usize>(&self, script: &Script, work: &Path) -> Result<PathBuf> {
         let GmshSource { file, adapted, guard, .. } = self.source;
         let path = &file.value;
-        let own = match is_shape(path) {
-            true => foreign::script(path, &script.files[0], D, guard.size, work)?,
-            false => path.clone(),
-        };
+        let own =
+            if is_shape(path) { foreign::script(path, &script.files[0], D, guard.size, work)? } else { path.clone() };
         match adapted {
             Some(adapted) => script::sized(&Located::new(own, file.place.clone()), script, &adapted.sizes, work),
             None if script.is_ended() || own != *path => Ok(own),

@@ -1,8 +1,9 @@
-//! What lies near each other in space stays together: an order of cells in memory, and a partition of points over ranks.
+//! What lies near each other in space stays together: an order of cells in memory, and a partition of points over
+//! ranks.
 //!
-//! Gmsh lists tetrahedra in the order in which its Delaunay kernel found them, and nodes are numbered in the order of the
-//! cells. A product with the stiffness matrix then jumps through memory. With cells in the order of Morton's curve through
-//! their centres it does not.
+//! Gmsh lists tetrahedra in the order in which its Delaunay kernel found them, and nodes are numbered in the order of
+//! the cells. A product with the stiffness matrix then jumps through memory. With cells in the order of Morton's curve
+//! through their centres it does not.
 //!
 //! Points are partitioned by recursive bisection of coordinates. Points of two bodies that lie together in a contact are in the same
 //! part, or in neighbouring parts. Iterations of all linear steps with hypre on 1, 2, 3, 5, 8 ranks: groove3d n = 24 50, 53, 54, 54,
@@ -18,8 +19,8 @@ use std::ops::Range;
 const BITS: u32 = 21;
 
 impl<const D: usize> Mesh<D> {
-    /// Sort the cells of each group along Morton's curve. Structured meshes in the plane already have a good order, so only
-    /// cells in space are sorted.
+    /// Sort the cells of each group along Morton's curve. Structured meshes in the plane already have a good order, so
+    /// only cells in space are sorted.
     pub fn sort_cells(&mut self) {
         if D < 3 {
             return;
@@ -54,9 +55,9 @@ fn spread(x: u64) -> u64 {
     (0..BITS).fold(0, |spread, bit| spread | (x >> bit & 1) << (3 * bit))
 }
 
-/// Return the part of each point, from 0 to `parts - 1`. All points are cut across the longest side of the box around them,
-/// then those on either side likewise. Each cut divides the weight in proportion to the parts on its sides, to within the
-/// weight of one point.
+/// Return the part of each point, from 0 to `parts - 1`. All points are cut across the longest side of the box around
+/// them, then those on either side likewise. Each cut divides the weight in proportion to the parts on its sides, to
+/// within the weight of one point.
 pub fn bisect<const D: usize>(points: &[[f64; D]], weight: &[u32], parts: usize) -> Vec<u32> {
     let mut part_of = vec![0; points.len()];
     let all: Vec<u32> = (0..points.len() as u32).collect();
@@ -89,8 +90,8 @@ fn longest<const D: usize>(points: impl Iterator<Item = [f64; D]>) -> usize {
     (0..D).rev().max_by(|&a, &b| (high[a] - low[a]).total_cmp(&(high[b] - low[b]))).unwrap_or(0)
 }
 
-/// Compare two points, given with their numbers, along an axis. Points with equal coordinates are compared along the other
-/// axes, and then by number.
+/// Compare two points, given with their numbers, along an axis. Points with equal coordinates are compared along the
+/// other axes, and then by number.
 fn compare<const D: usize>(axis: usize, a: (&[f64; D], u32), b: (&[f64; D], u32)) -> Ordering {
     let along = (0..D).map(|k| (axis + k) % D).map(|c| a.0[c].total_cmp(&b.0[c]));
     along.fold(Ordering::Equal, Ordering::then).then(a.1.cmp(&b.1))
@@ -116,8 +117,8 @@ mod tests {
         assert!(mesh.groups[0].simplices().all(|cell| cell[1] == cell[0] + 1 && cell[3] == cell[0] + 3));
     }
 
-    /// A long box is cut across. A plane of points that does not belong to one part as a whole is cut along the next axis. Parts have equal weights to
-    /// within those of a few points, and do not depend on the order of the points.
+    /// A long box is cut across. A plane of points that does not belong to one part as a whole is cut along the next
+    /// axis. Parts have equal weights to within those of a few points, and do not depend on the order of the points.
     #[test]
     fn boxes_are_cut_across() {
         let points: Vec<[f64; 3]> =

@@ -1,8 +1,8 @@
 //! Simplicial meshes with named groups, from Gmsh.
 //!
-//! [`load`] is the entry point. Gmsh meshes a `.geo` script or a file of another program's geometry once, and the cache keeps
-//! the result. A `.msh` file (text or binary) and an `.inp` file are read directly. A mesh of another format is converted by
-//! Gmsh and cached, too. Arrays of a Rust program are checked. All later code sees a [`Mesh`] only.
+//! [`load`] is the entry point. Gmsh meshes a `.geo` script or a file of another program's geometry once, and the cache
+//! keeps the result. A `.msh` file (text or binary) and an `.inp` file are read directly. A mesh of another format is
+//! converted by Gmsh and cached, too. Arrays of a Rust program are checked. All later code sees a [`Mesh`] only.
 
 mod abaqus;
 mod arrays;
@@ -44,8 +44,9 @@ use crate::linalg::{bounds, pad};
 use crate::problem::order::Order;
 use std::path::PathBuf;
 
-/// Lengths of a mesh that a run computes with. The lengths of atoms and of galaxies lie between 1e-40 and 1e40 in all units in
-/// use. Areas and volumes of cells lead to sixth powers of lengths, which are still finite and nonzero in this range.
+/// Lengths of a mesh that a run computes with. The lengths of atoms and of galaxies lie between 1e-40 and 1e40 in all
+/// units in use. Areas and volumes of cells lead to sixth powers of lengths, which are still finite and nonzero in this
+/// range.
 pub const LENGTHS: [f64; 2] = [1e-40, 1e40];
 
 /// A mesh: points and named groups of simplices.
@@ -61,11 +62,11 @@ pub const LENGTHS: [f64; 2] = [1e-40, 1e40];
 pub struct Mesh<const D: usize> {
     /// The file that the user named (`.geo` or `.msh`), for messages.
     pub path: PathBuf,
-    /// Coordinates of the points relative to `datum`, in the order of the file. A mesh from a file keeps only points that some
-    /// group uses, a mesh from arrays keeps all.
+    /// Coordinates of the points relative to `datum`, in the order of the file. A mesh from a file keeps only points
+    /// that some group uses, a mesh from arrays keeps all.
     pub points: Vec<[f64; D]>,
-    /// The point of the scene from which coordinates are measured. It is the origin of the scene unless the mesh is far from it
-    /// ([`Mesh::measure_nearby`]).
+    /// The point of the scene from which coordinates are measured. It is the origin of the scene unless the mesh is far
+    /// from it ([`Mesh::measure_nearby`]).
     pub datum: [f64; D],
     /// Uncertainty of the coordinates beyond the rounding of doubles ([`digits`]).
     pub uncertainty: f64,
@@ -100,8 +101,8 @@ impl<const D: usize> Mesh<D> {
         pad(datum::in_scene(&self.datum, x))
     }
 
-    /// Measure the coordinates from a datum near the mesh if the origin is far away; see [`datum`]. `along` tells along which
-    /// axes the origin may move.
+    /// Measure the coordinates from a datum near the mesh if the origin is far away; see [`datum`]. `along` tells along
+    /// which axes the origin may move.
     pub fn measure_nearby(&mut self, along: [bool; D]) {
         self.datum = datum::of(bounds(self.points.iter().copied().map(pad)), along);
         for x in &mut self.points {
@@ -114,8 +115,8 @@ impl<const D: usize> Mesh<D> {
         self.groups.iter_mut().for_each(|group| group.tags = Vec::new());
     }
 
-    /// Return the mesh of the same simplices without mid-edge points, also in groups of points. Without such points the result
-    /// is a copy.
+    /// Return the mesh of the same simplices without mid-edge points, also in groups of points. Without such points the
+    /// result is a copy.
     pub fn lower_order(&self) -> Mesh<D> {
         let mut groups = self.groups.to_vec();
         for group in groups.iter_mut() {

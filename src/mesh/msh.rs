@@ -1,4 +1,5 @@
-//! A reader of Gmsh's `.msh` 4.1 and 2.2, text and binary, in one pass from front to back. The sections of 2.2 are read in [`super::msh2`].
+//! A reader of Gmsh's `.msh` 4.1 and 2.2, text and binary, in one pass from front to back. The sections of 2.2 are read
+//! in [`super::msh2`].
 
 use super::builder::{MeshBuilder, MeshProducer, kind_of};
 use super::scan::Scanner;
@@ -60,12 +61,11 @@ pub fn read<const D: usize>(path: &Path, input: &mut dyn BufRead, maker: MeshPro
         scan.leave()?;
         seen.push(section);
     }
-    match seen.iter().any(|seen| seen == "Elements") {
-        true => mesh.finish(path),
-        false => {
-            let error = Error::mesh(path, None, "there are no elements");
-            Err(error.help("the file was cut short, or nothing was meshed"))
-        }
+    if seen.iter().any(|seen| seen == "Elements") {
+        mesh.finish(path)
+    } else {
+        let error = Error::mesh(path, None, "there are no elements");
+        Err(error.help("the file was cut short, or nothing was meshed"))
     }
 }
 
@@ -240,12 +240,11 @@ fn read_counts(scan: &mut Scanner) -> Result<[usize; 2]> {
 }
 
 fn check_total(scan: &Scanner, section: &str, seen: usize, total: usize) -> Result<()> {
-    match seen == total {
-        true => Ok(()),
-        false => {
-            let what = section.to_lowercase();
-            Err(scan.damaged(format!("${section} announces {total} {what} and holds {seen}")))
-        }
+    if seen == total {
+        Ok(())
+    } else {
+        let what = section.to_lowercase();
+        Err(scan.damaged(format!("${section} announces {total} {what} and holds {seen}")))
     }
 }
 
@@ -260,7 +259,8 @@ fn read_elements<const D: usize>(scan: &mut Scanner, mesh: &mut MeshBuilder<D>, 
         let count = scan.count()?;
         scan.end()?;
         let kind = scan.place(kind_of(number))?;
-        // This is checked even in blocks that nobody needs. The block may be one of another dimension whose head is damaged.
+        // This is checked even in blocks that nobody needs. The block may be one of another dimension whose head is
+        // damaged.
         let thing = THINGS[kind.shape.dimension].to_lowercase();
         if kind.shape.dimension as i32 != dimension {
             let message = format!("{} elements in a block of dimension {dimension}", kind.shape.name);

@@ -1,8 +1,8 @@
 //! The sections of Gmsh's format 2.2, and a writer of that format.
 //!
-//! Each element has its physical group, and the number of an entity of the geometry besides. Other programs write one number for all entities, so
-//! that groups are those of the physical tags alone. Entities are groups in a dimension without physical groups. An element of several groups
-//! stands in the file once for each of them.
+//! Each element has its physical group, and the number of an entity of the geometry besides. Other programs write one
+//! number for all entities, so that groups are those of the physical tags alone. Entities are groups in a dimension
+//! without physical groups. An element of several groups stands in the file once for each of them.
 
 use super::Mesh;
 use super::builder::{MeshBuilder, kind_of};
@@ -88,8 +88,8 @@ pub fn read_elements<const D: usize>(scan: &mut Scanner, mesh: &mut MeshBuilder<
     Ok(())
 }
 
-/// Read an element, whose type and number of tags are in the `head` of a binary file. The first tag is that of the physical group, the second one
-/// is that of the entity. Partitions follow.
+/// Read an element, whose type and number of tags are in the `head` of a binary file. The first tag is that of the
+/// physical group, the second one is that of the entity. Partitions follow.
 fn read_element(scan: &mut Scanner, [kind, tags]: [i32; 2]) -> Result<Element> {
     let mut head = [kind, tags];
     let mut element = 0;

@@ -1,6 +1,7 @@
 //! The numbers and lines of a `.msh` file from front to back, text or binary, with the line for messages.
 //!
-//! A record is a line of a text file, or some bytes of a binary one. [`Scanner::begin`] reads it, and the numbers are then taken from it.
+//! A record is a line of a text file, or some bytes of a binary one. [`Scanner::begin`] reads it, and the numbers are
+//! then taken from it.
 
 use crate::error::{Error, Result};
 use std::io::{BufRead, Read};
@@ -193,9 +194,10 @@ impl<'a> Scanner<'a> {
 
     /// End a record: a line of text must end here.
     pub fn end(&mut self) -> Result<()> {
-        match self.binary || self.record[self.at..].trim_ascii().is_empty() {
-            true => Ok(()),
-            false => Err(self.damaged("this line has more entries than expected")),
+        if self.binary || self.record[self.at..].trim_ascii().is_empty() {
+            Ok(())
+        } else {
+            Err(self.damaged("this line has more entries than expected"))
         }
     }
 

@@ -1,8 +1,9 @@
-//! The facts about a `.geo` script that matter before Gmsh runs it: which files it reads, and which names a number can be set for. Scripts that
-//! follow a field of sizes are made here, too.
+//! The facts about a `.geo` script that matter before Gmsh runs it: which files it reads, and which names a number can
+//! be set for. Scripts that follow a field of sizes are made here, too.
 //!
-//! This is a search through its words, not an interpreter. A script is a program: it may read the clock, the environment, or files whose names
-//! it computes. The mesh of a script that does so, as its words tell, is made anew in each run.
+//! This is a search through its words, not an interpreter. A script is a program: it may read the clock, the
+//! environment, or files whose names it computes. The mesh of a script that does so, as its words tell, is made anew in
+//! each run.
 
 use super::foreign::is_data;
 use crate::error::{Error, Kind, Located, Result};
@@ -26,7 +27,8 @@ pub struct Script {
 }
 
 impl Script {
-    /// Read the script and the files that it includes or merges. The shape of another program is read alike: it has no words.
+    /// Read the script and the files that it includes or merges. The shape of another program is read alike: it has no
+    /// words.
     ///
     /// # Errors
     /// The script cannot be read. Gmsh reports included files that do not exist.
@@ -63,8 +65,8 @@ impl Script {
         Ok(Script { paths: found, ..script })
     }
 
-    /// Return whether the last line is ended. Otherwise Gmsh silently omits the last command, unless another script includes
-    /// this one.
+    /// Return whether the last line is ended. Otherwise Gmsh silently omits the last command, unless another script
+    /// includes this one.
     pub fn is_ended(&self) -> bool {
         self.files.first().is_none_or(|text| text.ends_with(b"\n"))
     }
@@ -84,8 +86,8 @@ impl Script {
     }
 }
 
-/// Words of Gmsh whose values are not those of the script's files: the clock, the memory, random numbers, the environment, paths, and what
-/// other programs say.
+/// Words of Gmsh whose values are not those of the script's files: the clock, the memory, random numbers, the
+/// environment, paths, and what other programs say.
 const CHANGING: [&str; 19] = [
     "Cpu",
     "Memory",
@@ -133,9 +135,9 @@ pub fn quoted(path: &Path) -> Result<String> {
     }
 }
 
-/// Return the path of a file with the links of its folder resolved. A link to the file itself is not resolved, because Gmsh
-/// looks for other files beside the link. Scripts may include each other along ever longer paths, which become equal in this
-/// form.
+/// Return the path of a file with the links of its folder resolved. A link to the file itself is not resolved, because
+/// Gmsh looks for other files beside the link. Scripts may include each other along ever longer paths, which become
+/// equal in this form.
 fn located(path: &Path) -> Option<PathBuf> {
     let folder = path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
     Some(folder.canonicalize().ok()?.join(path.file_name()?))
@@ -148,14 +150,16 @@ fn options_of(path: &Path) -> PathBuf {
     name.into()
 }
 
-/// What Gmsh says of a script whose mesh is larger than its shape. Fields of sizes are evaluated on the shape, and sizes are known on the mesh.
+/// What Gmsh says of a script whose mesh is larger than its shape. Fields of sizes are evaluated on the shape, and
+/// sizes are known on the mesh.
 const SCALED: &str = "Mesh.ScalingFactor must be 1 where meshes follow sizes: scale the shape (Dilate) instead";
 
 /// Write a script into the folder `work` that meshes another script to a field of sizes, and return its path.
 ///
-/// `field` is a view of Gmsh (`.pos`). Where a point is in none of the view's cells, Gmsh would make cells as large as the
-/// part, so the script limits sizes to the largest of the view. A smallest size that the other script sets (`Mesh.MeshSizeMin`) gives way to
-/// the smallest of the view, and a factor on sizes (`Mesh.MeshSizeFactor`) to one. Structured meshes cannot follow sizes, so their commands are removed in a copy.
+/// `field` is a view of Gmsh (`.pos`). Where a point is in none of the view's cells, Gmsh would make cells as large as
+/// the part, so the script limits sizes to the largest of the view. A smallest size that the other script sets
+/// (`Mesh.MeshSizeMin`) gives way to the smallest of the view, and a factor on sizes (`Mesh.MeshSizeFactor`) to one.
+/// Structured meshes cannot follow sizes, so their commands are removed in a copy.
 ///
 /// # Errors
 /// A structured script reads other files, which a copy would not find. The folder cannot be written.
@@ -202,8 +206,8 @@ pub fn unstructured(text: &str) -> String {
     kept + &text[from..]
 }
 
-/// Return a field of sizes on simplices as a view of Gmsh. `corners` holds the corners of all simplices, `stride` of them each,
-/// and `sizes` the size at each corner.
+/// Return a field of sizes on simplices as a view of Gmsh. `corners` holds the corners of all simplices, `stride` of
+/// them each, and `sizes` the size at each corner.
 pub fn view(stride: usize, corners: &[[f64; 3]], sizes: &[f64]) -> String {
     let mut text = String::from("View \"sizes\" {\n");
     let list = |values: &mut dyn Iterator<Item = f64>| values.map(|v| format!("{v:e}")).collect::<Vec<_>>().join(",");
@@ -227,8 +231,8 @@ enum ScriptToken<'a> {
     Sign(char),
 }
 
-/// Return the names, quoted texts and other signs of a script, with the range of bytes where each stands. Comments and numbers
-/// are omitted.
+/// Return the names, quoted texts and other signs of a script, with the range of bytes where each stands. Comments and
+/// numbers are omitted.
 fn tokens(text: &str) -> Vec<(Range<usize>, ScriptToken<'_>)> {
     let mut tokens = Vec::new();
     let mut at = 0;

@@ -19,8 +19,8 @@ pub struct Shape {
     pub corners: usize,
     /// Ends of the edges in Gmsh's order of mid-edge nodes.
     pub edges: &'static [[usize; 2]],
-    /// Corners of the faces of shapes that are divided, with quadrangles in Gmsh's order of the nodes in their middle. Those of a
-    /// quadrangle are its edges.
+    /// Corners of the faces of shapes that are divided, with quadrangles in Gmsh's order of the nodes in their middle.
+    /// Those of a quadrangle are its edges.
     pub faces: &'static [&'static [usize]],
 }
 
@@ -180,8 +180,8 @@ pub fn turn(simplex: &mut [u32], points: &[[f64; 3]], dimension: usize, space: u
     true
 }
 
-/// Translate the first of up to four vertices to the origin and scale them by a power of two, which is exact. The largest
-/// difference of coordinates is then near one, so that powers of lengths neither vanish nor overflow.
+/// Translate the first of up to four vertices to the origin and scale them by a power of two, which is exact. The
+/// largest difference of coordinates is then near one, so that powers of lengths neither vanish nor overflow.
 fn of_unit_size(vertices: &[[f64; 3]]) -> [[f64; 3]; 4] {
     let mut scaled = [[0.0; 3]; 4];
     for (edge, vertex) in scaled.iter_mut().zip(vertices) {
@@ -194,8 +194,9 @@ fn of_unit_size(vertices: &[[f64; 3]]) -> [[f64; 3]; 4] {
     scaled
 }
 
-/// Return the signed measure of the simplex on these vertices, times the factorial of its dimension. The sign is meaningful for
-/// cells alone: for triangles if `space` is 2, for tetrahedra if it is 3. Coordinates are (x, y, z); z is unused in the plane.
+/// Return the signed measure of the simplex on these vertices, times the factorial of its dimension. The sign is
+/// meaningful for cells alone: for triangles if `space` is 2, for tetrahedra if it is 3. Coordinates are (x, y, z); z
+/// is unused in the plane.
 pub fn measure(vertices: &[[f64; 3]], space: usize) -> f64 {
     let edge = |to: usize| Vector3::from(vertices[to]) - Vector3::from(vertices[0]);
     match vertices.len() {
@@ -207,8 +208,8 @@ pub fn measure(vertices: &[[f64; 3]], space: usize) -> f64 {
     }
 }
 
-/// Return whether a simplex of unit size with this [`measure`] has no extent, to rounding. A measure that is not finite counts
-/// as none.
+/// Return whether a simplex of unit size with this [`measure`] has no extent, to rounding. A measure that is not finite
+/// counts as none.
 fn is_degenerate(vertices: &[[f64; 3]], measure: f64) -> bool {
     let pairs = vertices.iter().enumerate().flat_map(|(i, a)| vertices[..i].iter().map(move |b| (a, b)));
     let longest = pairs.map(|(a, b)| (Vector3::from(*a) - Vector3::from(*b)).norm()).fold(0.0, f64::max);

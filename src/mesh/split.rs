@@ -5,9 +5,9 @@
 //! numbers of its vertices alone, so that cells of any kind agree on common faces.
 //!
 //! Cells of higher orders get nodes on the diagonals. A diagonal of a face has them where the map that blends the edges
-//! of the face takes the diagonal of the reference square, and a diagonal through a quadratic cell has one where the map
-//! of the cell takes the centre of the reference cube. The boundary of the simplices is thus interpolated from that of
-//! the cells.
+//! of the face takes the diagonal of the reference square, and a diagonal through a quadratic cell has one where the
+//! map of the cell takes the centre of the reference cube. The boundary of the simplices is thus interpolated from that
+//! of the cells.
 
 use super::shape::turned;
 use super::simplex::{EDGES, ElementType, QUADRANGLE, Shape};
@@ -20,8 +20,8 @@ fn quadrangles(shape: &Shape) -> impl Iterator<Item = &'static [usize]> {
     faces.iter().copied().filter(|face| face.len() == 4)
 }
 
-/// Return the simplices of a cell, `dimension + 1` vertices each, with any orientation. The vertices are the first nodes of
-/// `cell`. Simplices in which a vertex occurs twice, since an edge was drawn into a point, are omitted.
+/// Return the simplices of a cell, `dimension + 1` vertices each, with any orientation. The vertices are the first
+/// nodes of `cell`. Simplices in which a vertex occurs twice, since an edge was drawn into a point, are omitted.
 fn divided(shape: &Shape, cell: &[u32]) -> Vec<u32> {
     let faces: Vec<Vec<u32>> = shape.faces.iter().map(|face| face.iter().map(|&at| cell[at]).collect()).collect();
     let all_differ =
@@ -45,8 +45,8 @@ fn cone(cell: &[u32], faces: &[Vec<u32>]) -> Vec<Vec<u32>> {
     simplices
 }
 
-/// The maker of the nodes in the middle of diagonals. Faces are known by their vertices, so that all cells and facets at a face
-/// share its node. So do copies of a cell in several groups.
+/// The maker of the nodes in the middle of diagonals. Faces are known by their vertices, so that all cells and facets
+/// at a face share its node. So do copies of a cell in several groups.
 pub struct Middles<'a> {
     /// Coordinates of all points, to which new ones are appended.
     pub points: &'a mut Vec<[f64; 3]>,
@@ -56,7 +56,8 @@ pub struct Middles<'a> {
 }
 
 impl Middles<'_> {
-    /// Return the simplices of a cell with the nodes `cell`, with any orientation, each with vertices before mid-edge nodes.
+    /// Return the simplices of a cell with the nodes `cell`, with any orientation, each with vertices before mid-edge
+    /// nodes.
     pub fn simplices(&mut self, kind: ElementType, cell: &[u32]) -> Vec<u32> {
         let Shape { dimension, .. } = *kind.shape;
         let vertices = divided(kind.shape, cell);
@@ -75,8 +76,8 @@ impl Middles<'_> {
 
     /// Return the nodes between two vertices of a cell with the nodes `cell`, from the first to the second one.
     ///
-    /// Edges come first, since a diagonal of a face is an edge of the cell where another edge of the face was drawn into a
-    /// point. For the same reason faces come before the cell.
+    /// Edges come first, since a diagonal of a face is an edge of the cell where another edge of the face was drawn
+    /// into a point. For the same reason faces come before the cell.
     fn inside(&mut self, kind: ElementType, cell: &[u32], ends: [u32; 2]) -> SmallVec<[u32; 2]> {
         let (shape, count) = (kind.shape, kind.inside() as u32);
         if let Some(nodes) = on_edge(kind, cell, ends) {
@@ -165,8 +166,9 @@ mod tests {
         (volume, faces)
     }
 
-    /// Whatever the numbers of the vertices, the pieces fill the cell, and those of two cells have the same triangles on the common face. The points
-    /// are those of a cube and, beside its face x = 1, of a prism with the vertices 1 2 6 5 8 9.
+    /// Whatever the numbers of the vertices, the pieces fill the cell, and those of two cells have the same triangles
+    /// on the common face. The points are those of a cube and, beside its face x = 1, of a prism with the vertices 1 2
+    /// 6 5 8 9.
     #[test]
     fn pieces_fill_cells_and_fit_across_faces() {
         let named = [&CUBE[..], &[[2.0, 0.0, 0.0], [2.0, 1.0, 0.0], [3.0, 0.5, 0.5], [0.0; 3]]].concat();
@@ -226,7 +228,8 @@ mod tests {
         assert!((x - 0.5).abs() + (y - 0.5).abs() + (z - 0.05).abs() < 1e-15);
         let full = middles.simplices(kind(10), &[2, 3, 7, 6, 13, 15, 19, 14, 99]);
         assert!(!full.contains(&99), "the node that the hexahedron has made");
-        // With an edge drawn into a point a hexahedron is a prism: 3 and 7 are 2 and 6, and with them go the mid-edge nodes of 0 3, 2 3, 3 7, 4 7, 6 7.
+        // With an edge drawn into a point a hexahedron is a prism: 3 and 7 are 2 and 6, and with them go the mid-edge
+        // nodes of 0 3, 2 3, 3 7, 4 7, 6 7.
         let sorted = |simplices: Vec<u32>| {
             let mut all: Vec<Vec<u32>> = simplices.chunks_exact(10).map(<[u32]>::to_vec).collect();
             all.iter_mut().for_each(|simplex| simplex.sort_unstable());

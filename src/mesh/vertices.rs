@@ -1,19 +1,20 @@
 //! Vertices of boundaries that are moved to given places, so that a solution is smooth in each cell beside them.
 //!
-//! Elements of high order converge fast where the solution is smooth. At an end of the contact, and where a gap has a kink, it is smooth on both sides, but
-//! not in a cell that holds the place. A mesher knows only sizes, so that its mesh is changed afterwards.
+//! Elements of high order converge fast where the solution is smooth. At an end of the contact, and where a gap has a
+//! kink, it is smooth on both sides, but not in a cell that holds the place. A mesher knows only sizes, so that its
+//! mesh is changed afterwards.
 
 use super::shape::turned;
 use super::{Mesh, edges};
 use crate::linalg::{axpy, dot, interpolation_weights, length, minus, unit};
 use std::collections::{BTreeMap, HashMap, HashSet};
 
-/// Least ratio of the area of a cell after a move to that before it. A vertex that moves by half of an edge along a boundary
-/// halves that of a regular cell; an irregular one may have a half of what is left.
+/// Least ratio of the area of a cell after a move to that before it. A vertex that moves by half of an edge along a
+/// boundary halves that of a regular cell; an irregular one may have a half of what is left.
 const AREA: f64 = 0.25;
 
-/// Largest angle in radians between the two edges of a smooth boundary at their vertex. On a circle quadratic edges that turn by t each differ there by t^3/16,
-/// which is 0.009 for twelve edges, and those of higher orders by less.
+/// Largest angle in radians between the two edges of a smooth boundary at their vertex. On a circle quadratic edges
+/// that turn by t each differ there by t^3/16, which is 0.009 for twelve edges, and those of higher orders by less.
 const SMOOTH: f64 = 0.02;
 
 /// A vertex of a boundary in the plane with the two edges that meet there: their points in a row, the vertex in the
@@ -124,8 +125,8 @@ impl Mesh<2> {
             .then(|| (0..=2 * degree).map(|k| curve(along_chord(k))).collect())
     }
 
-    /// Give the points of a passage new places, and the other edges at its vertex straight shifts. Return false, and change nothing, if a cell at the vertex
-    /// becomes too small.
+    /// Give the points of a passage new places, and the other edges at its vertex straight shifts. Return false, and
+    /// change nothing, if a cell at the vertex becomes too small.
     fn set_passage(&mut self, passage: &Passage, points: Vec<[f64; 2]>, cells: &[Vec<u32>]) -> bool {
         let degree = self.order.degree();
         let vertex = passage[degree];
@@ -187,7 +188,8 @@ mod tests {
     use super::{length, minus};
     use crate::problem::Order;
 
-    /// Return `count` squares in a row, each two quadratic triangles, with the curve `top` of all and the curve `end` at the last edge. `shape` gives places.
+    /// Return `count` squares in a row, each two quadratic triangles, with the curve `top` of all and the curve `end`
+    /// at the last edge. `shape` gives places.
     fn row(count: u32, shape: impl Fn([f64; 2]) -> [f64; 2]) -> Mesh<2> {
         let points = (0..=2 * count).flat_map(|i| (0..3).map(move |j| [f64::from(i), f64::from(j)].map(|x| 0.5 * x)));
         let at = |i: u32, j: u32| 3 * i + j;

@@ -22,18 +22,21 @@ pub struct Energy {
     pub potential: f64,
 }
 
-/// An elastic body with stiffness K, load f and contact rows B (one row for each contact point of each of its surfaces).
+/// An elastic body with stiffness K, load f and contact rows B (one row for each contact point of each of its
+/// surfaces).
 ///
-/// If the body is distributed over ranks, K has the dofs that this rank owns, and its columns are those of the distributed matrix that has its rows. A condensed
-/// body has its interface dofs; its displacements stand for those of the whole body with its interior in equilibrium, so that residual, energies and all
-/// output have the values of the whole body. Solves may be inexact, but [`Body::residual`] is exact. Errors are failures of the solver library.
+/// If the body is distributed over ranks, K has the dofs that this rank owns, and its columns are those of the
+/// distributed matrix that has its rows. A condensed body has its interface dofs; its displacements stand for those of
+/// the whole body with its interior in equilibrium, so that residual, energies and all output have the values of the
+/// whole body. Solves may be inexact, but [`Body::residual`] is exact. Errors are failures of the solver library.
 pub struct Body {
     dofs: Dofs,
     /// K and the loads. K is empty if a solver stores it, or if it was given away.
     elastic: ElasticBody,
     /// The diagonal of K, if K itself is in a solver or was given away; else empty.
     diagonal: Vec<f64>,
-    /// G, which is made when something is first solved. A body that is only measured, or joined with others, needs none.
+    /// G, which is made when something is first solved. A body that is only measured, or joined with others, needs
+    /// none.
     matrix: Option<SpringMatrix>,
     /// The function that makes the solver of G; `None` once it was used.
     make: Option<MakeSolver>,
@@ -67,11 +70,12 @@ struct Interior {
 }
 
 impl Body {
-    /// Join a body, whose K has a pattern that holds that of B'B, its contact rows B (columns: its dofs, none of them prescribed), and the rigid motions
-    /// `unconstrained_modes` that its supports and springs leave, one vector over the dofs each. `make` makes a solver of K when something is first solved, and `words` describe that solver.
+    /// Join a body, whose K has a pattern that holds that of B'B, its contact rows B (columns: its dofs, none of them
+    /// prescribed), and the rigid motions `unconstrained_modes` that its supports and springs leave, one vector over
+    /// the dofs each. `make` makes a solver of K when something is first solved, and `words` describe that solver.
     ///
-    /// A distributed body has the dofs that this rank owns, while `rows` and `unconstrained_modes` have those of its owned and ghost nodes. If the body gets a matrix of its
-    /// own, that is distributed over all ranks.
+    /// A distributed body has the dofs that this rank owns, while `rows` and `unconstrained_modes` have those of its
+    /// owned and ghost nodes. If the body gets a matrix of its own, that is distributed over all ranks.
     pub fn new(
         mut elastic: ElasticBody,
         rows: Csr,
@@ -149,8 +153,8 @@ impl Body {
         &self.dofs
     }
 
-    /// Compute the equilibrium residual (26) r = f - K u - B' force, with `product` = K u and `force` = omega p at each row. Return the
-    /// energies of u.
+    /// Compute the equilibrium residual (26) r = f - K u - B' force, with `product` = K u and `force` = omega p at each
+    /// row. Return the energies of u.
     pub fn residual(&self, u: &[f64], product: &[f64], force: &[f64], r: &mut [f64]) -> Energy {
         let ElasticBody { load, lifting, strain_constant, energy_constant, .. } = &self.elastic;
         for (r, (load, product)) in r.iter_mut().zip(load.iter().zip(product)) {
@@ -164,12 +168,13 @@ impl Body {
         }
     }
 
-    /// Return the squared energy norm of forces r at the dofs, taken for each dof alone: r'D^-1 r with the diagonal D of
-    /// K + B' diag(`springs`) B, for `springs` at each row.
+    /// Return the squared energy norm of forces r at the dofs, taken for each dof alone: r'D^-1 r with the diagonal D
+    /// of K + B' diag(`springs`) B, for `springs` at each row.
     pub fn unbalanced(&self, r: &[f64], springs: &[f64]) -> f64 {
-        let mut diagonal = match self.diagonal.is_empty() {
-            true => (0..self.dofs.count).map(|i| self.elastic.stiffness.diagonal(i)).collect(),
-            false => self.diagonal.clone(),
+        let mut diagonal = if self.diagonal.is_empty() {
+            (0..self.dofs.count).map(|i| self.elastic.stiffness.diagonal(i)).collect()
+        } else {
+            self.diagonal.clone()
         };
         for (q, spring) in springs.iter().enumerate().filter(|(_, spring)| **spring > 0.0) {
             self.dofs.rows.row(q).for_each(|(i, b)| diagonal[i] += spring * b * b);
@@ -223,8 +228,8 @@ impl Body {
         self.matrix.as_mut().ok_or_else(|| Error::new(Kind::Solver, "an inner solver could not be made"))
     }
 
-    /// Form the Robin matrix G = K + B' diag(weight) B (37)-(38), with `weight` = omega psi kappa at each row. Nothing happens if the weights
-    /// are those of the last call.
+    /// Form the Robin matrix G = K + B' diag(weight) B (37)-(38), with `weight` = omega psi kappa at each row. Nothing
+    /// happens if the weights are those of the last call.
     pub fn robin(&mut self, weight: &[f64]) -> Result<()> {
         self.spring_matrix()?;
         let rows = self.dofs.matrix_rows();
@@ -246,14 +251,16 @@ impl Body {
         self.spring_matrix()?.apply(|solver| solver.solve(r, z))
     }
 
-    /// Compute z = M^-1 r with a fixed symmetric M that approximates G. This preconditions conjugate gradients over all bodies. It costs no more than
-    /// a solve, and for an iterative inner solver only one application of its preconditioner.
+    /// Compute z = M^-1 r with a fixed symmetric M that approximates G. This preconditions conjugate gradients over all
+    /// bodies. It costs no more than a solve, and for an iterative inner solver only one application of its
+    /// preconditioner.
     pub fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<SolveOutcome> {
         self.spring_matrix()?.apply(|solver| solver.precondition(r, z))
     }
 
-    /// Return a load on all dofs as a force on those of the body, and its work while the interface dofs do not move: r_I' K_II^-1 r_I with the load r_I on
-    /// eliminated dofs I, zero if there are none. What acts on supports is left out.
+    /// Return a load on all dofs as a force on those of the body, and its work while the interface dofs do not move:
+    /// r_I' K_II^-1 r_I with the load r_I on eliminated dofs I, zero if there are none. What acts on supports is left
+    /// out.
     pub fn reduce(&mut self, load: &[f64]) -> Result<(Vec<f64>, f64)> {
         match &mut self.interior {
             None => Ok((self.dofs.reduce(load), 0.0)),
@@ -261,7 +268,8 @@ impl Body {
         }
     }
 
-    /// Return the displacements of the owned and ghost nodes of this rank from those of the dofs. Collective for a distributed body.
+    /// Return the displacements of the owned and ghost nodes of this rank from those of the dofs. Collective for a
+    /// distributed body.
     pub fn recover(&self, u: &[f64]) -> Result<Vec<f64>> {
         self.interior.as_ref().map_or_else(|| Ok(self.dofs.recover(u)), |interior| interior.recover(u))
     }

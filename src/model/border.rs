@@ -1,24 +1,25 @@
 //! Rigid parts beside a matrix that has complete nodes only: their few unknowns are eliminated around it.
 //!
-//! Let G = K + B'DB be the matrix, with springs D at the contact points, N the closings of the points by the motions of rigid parts, and a their
-//! amounts. Then
+//! Let G = K + B'DB be the matrix, with springs D at the contact points, N the closings of the points by the motions of
+//! rigid parts, and a their amounts. Then
 //!
 //! ```text
 //! G x + B'D N a = r            x = x_0 - X a,     G x_0 = r,   G X = B'D N
 //! N'D (B x + N a) = s          S a = s - N'D B x_0,     S = N'D (N - B X) = (N - B X)'D (N - B X) + X'K X
 //! ```
 //!
-//! where s is the work that is left on the motions. X stays as long as the springs do. The last form of S is the energy of the motions with the bodies
-//! that follow them. It stays positive, and errors of X are in it squared, where a body follows so well that nearly nothing of N'D N is left.
+//! where s is the work that is left on the motions. X stays as long as the springs do. The last form of S is the energy
+//! of the motions with the bodies that follow them. It stays positive, and errors of X are in it squared, where a body
+//! follows so well that nearly nothing of N'D N is left.
 
 use super::Model;
 use super::rigid::Motions;
 use crate::linalg::{axpy, dot};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-/// Relative error of the columns of X, in the energy norm. The error of a step by them is that share of the part of the step that moves the rigid parts.
-/// `meshes/indenter`, `meshes/bolt`, and a sphere on 81 675 dofs take 74, 299 and 131 iterations of multigrid, instead of 200, 349 and 325 with 1e-2, and
-/// 82, 290 and 280 with 1e-8.
+/// Relative error of the columns of X, in the energy norm. The error of a step by them is that share of the part of the
+/// step that moves the rigid parts. `meshes/indenter`, `meshes/bolt`, and a sphere on 81 675 dofs take 74, 299 and 131
+/// iterations of multigrid, instead of 200, 349 and 325 with 1e-2, and 82, 290 and 280 with 1e-8.
 pub(super) const ACCURACY: f64 = 1e-4;
 
 /// A motion of a rigid part.
@@ -115,7 +116,8 @@ impl Border {
         self.factor.is_some()
     }
 
-    /// Return how the rigid parts move where x_0 closes the points by `closing`, n, and `work` is the work s on their motions.
+    /// Return how the rigid parts move where x_0 closes the points by `closing`, n, and `work` is the work s on their
+    /// motions.
     pub fn moved(&self, work: &[f64], closing: &[f64]) -> BorderStep {
         let count = work.len();
         let lacking = DVector::from_fn(count, |i, _| work[i] - dot(&self.forces[i], closing));

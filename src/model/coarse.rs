@@ -10,12 +10,14 @@ use crate::solver::MakeSubspace;
 use nalgebra::DVector;
 use std::rc::Rc;
 
-/// The free rigid motions of the bodies as a coarse space of H = K + B'DB of all bodies together, where D are springs at the contact points.
+/// The free rigid motions of the bodies as a coarse space of H = K + B'DB of all bodies together, where D are springs
+/// at the contact points.
 ///
-/// Many bodies on each other are a frame whose joints are layers. No smoother reduces errors in which the frame moves as a whole, and
-/// coarse levels of multigrid do so only as far as they have the rigid motions of each body. So H is solved exactly in the space of all free rigid motions,
-/// which are the columns of Z (balancing: Mandel, Comm. Numer. Meth. Engng 9, 1993). Since K Z = 0, HZ = B'D BZ takes only sums over contact points. Z'HZ has one
-/// block for each body and one for each two bodies in contact. Motions that no spring resists are left out.
+/// Many bodies on each other are a frame whose joints are layers. No smoother reduces errors in which the frame moves
+/// as a whole, and coarse levels of multigrid do so only as far as they have the rigid motions of each body. So H is
+/// solved exactly in the space of all free rigid motions, which are the columns of Z (balancing: Mandel, Comm. Numer.
+/// Meth. Engng 9, 1993). Since K Z = 0, HZ = B'D BZ takes only sums over contact points. Z'HZ has one block for each
+/// body and one for each two bodies in contact. Motions that no spring resists are left out.
 pub struct RigidSpace {
     /// Contact rows and motions of each body.
     bodies: Vec<(Vec<Segment>, Vec<Motion>)>,
@@ -38,9 +40,10 @@ struct MotionColumn {
 }
 
 impl RigidSpace {
-    /// Return a maker of the space for the bodies of a model, or `None` if no two bodies in contact can both move freely. Then no bodies move together, and the
-    /// space would save nothing. `offset` is the first entry of each body in a vector of this rank, and its length. `rows` are B of all
-    /// bodies together, and `first` is the number of the first row that this rank owns.
+    /// Return a maker of the space for the bodies of a model, or `None` if no two bodies in contact can both move
+    /// freely. Then no bodies move together, and the space would save nothing. `offset` is the first entry of each body
+    /// in a vector of this rank, and its length. `rows` are B of all bodies together, and `first` is the number of the
+    /// first row that this rank owns.
     pub fn of(model: &Model, offset: &[usize], rows: &Csr, first: usize) -> Option<MakeSubspace> {
         let mut free_sides = vec![0; model.pairs.len()];
         let bodies: Vec<(Vec<Segment>, Vec<Motion>)> = model.bodies.iter().map(of_body).collect();

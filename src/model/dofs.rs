@@ -1,5 +1,5 @@
-//! The dofs of a body: its contact rows, its prescribed values, the rigid motions that supports and springs leave free, and how its dofs are distributed over the
-//! ranks.
+//! The dofs of a body: its contact rows, its prescribed values, the rigid motions that supports and springs leave free,
+//! and how its dofs are distributed over the ranks.
 
 use crate::exchange::{Exchange, Serial, all_gather};
 use crate::fem::ElasticBody;
@@ -10,10 +10,11 @@ use std::rc::Rc;
 
 /// The dofs of a body.
 ///
-/// K E = 0 holds for the rigid motions E that supports and springs leave free, but only in exact numbers. Entries of K and u are rounded, and
-/// f - K u has an error of eps |K| |u| however it is summed. A body that falls far onto a soft layer would lose its strains in that error. So
-/// the part E a of every step is taken out of the displacements and moved into the gap ([`Field::advance`](super::Field::advance)), and a residual r gets the
-/// work E'r that loads and contact forces do on the motions ([`Dofs::balance`]).
+/// K E = 0 holds for the rigid motions E that supports and springs leave free, but only in exact numbers. Entries of K
+/// and u are rounded, and f - K u has an error of eps |K| |u| however it is summed. A body that falls far onto a soft
+/// layer would lose its strains in that error. So the part E a of every step is taken out of the displacements and
+/// moved into the gap ([`Field::advance`](super::Field::advance)), and a residual r gets the work E'r that loads and
+/// contact forces do on the motions ([`Dofs::balance`]).
 #[derive(Default)]
 pub struct Dofs {
     /// Number of dofs, or of those that this rank owns.
@@ -36,9 +37,11 @@ impl Dofs {
     /// - `dofs` is their number.
     /// - `prescribed` lists the prescribed dofs with their values.
     /// - `rows` are the contact rows B of the body.
-    /// - `unconstrained_modes` are the displacements of independent rigid motions that its supports and springs leave, zero at prescribed dofs.
+    /// - `unconstrained_modes` are the displacements of independent rigid motions that its supports and springs leave,
+    ///   zero at prescribed dofs.
     ///
-    /// If the body is distributed, the columns of `rows` and the displacements of `unconstrained_modes` belong to the owned and ghost nodes of this rank.
+    /// If the body is distributed, the columns of `rows` and the displacements of `unconstrained_modes` belong to the
+    /// owned and ghost nodes of this rank.
     pub fn new(
         dofs: usize,
         prescribed: Vec<(usize, f64)>,
@@ -82,8 +85,8 @@ impl Dofs {
         self.distribution.as_ref().map_or(&self.rows, |distribution| &distribution.rows)
     }
 
-    /// Return the amounts a of the rigid motions in displacements u, for which u - E a is orthogonal to all of them. For a distributed body they are sums over
-    /// ranks of what this returns.
+    /// Return the amounts a of the rigid motions in displacements u, for which u - E a is orthogonal to all of them.
+    /// For a distributed body they are sums over ranks of what this returns.
     pub fn amounts(&self, u: &[f64]) -> Vec<f64> {
         let products = DVector::from_iterator(
             self.unconstrained_modes.len(),
@@ -104,8 +107,8 @@ impl Dofs {
         u
     }
 
-    /// Correct forces r such that their work on the rigid motions, E'r, is `work`. K and its product are rounded, and do some work on them. Collective for a
-    /// distributed body.
+    /// Correct forces r such that their work on the rigid motions, E'r, is `work`. K and its product are rounded, and
+    /// do some work on them. Collective for a distributed body.
     pub fn balance(&self, r: &mut [f64], work: &[f64]) {
         let mut lacking: Vec<f64> = self.unconstrained_modes.iter().map(|motion| -dot(motion, r)).collect();
         if let Some(distribution) = &self.distribution {
@@ -135,8 +138,9 @@ impl Dofs {
     }
 }
 
-/// The distribution of the dofs of a body over the ranks, as one of them sees it: the dofs that it owns, and their places in the
-/// distributed matrix that has their rows of K. The matrix is that of all bodies, or one of the body's own.
+/// The distribution of the dofs of a body over the ranks, as one of them sees it: the dofs that it owns, and their
+/// places in the distributed matrix that has their rows of K. The matrix is that of all bodies, or one of the body's
+/// own.
 ///
 /// A vector has the dofs that this rank owns, so that products are sums over ranks.
 #[derive(Clone, Serialize, Deserialize)]
@@ -147,7 +151,8 @@ pub struct Distribution {
     pub own: Vec<u32>,
     /// Their positions among the dofs of the owned and ghost nodes of this rank, sorted.
     pub owned_positions: Vec<u32>,
-    /// For each other rank, the ghost dofs that it owns: their positions among the dofs of the owned and ghost nodes, and their rows in the matrix.
+    /// For each other rank, the ghost dofs that it owns: their positions among the dofs of the owned and ghost nodes,
+    /// and their rows in the matrix.
     pub ghosts: Vec<(Vec<u32>, Vec<u32>)>,
     /// Products, over all dofs of the body, of the rigid motions that its supports leave free.
     pub products: DMatrix<f64>,
@@ -171,7 +176,8 @@ fn alone() -> Rc<dyn Exchange> {
 }
 
 impl Distribution {
-    /// Return the values at the dofs of the owned and ghost nodes of this rank, from those at the owned dofs of every rank. Collective.
+    /// Return the values at the dofs of the owned and ghost nodes of this rank, from those at the owned dofs of every
+    /// rank. Collective.
     pub fn with_ghosts(&self, own: &[f64]) -> Vec<f64> {
         let ghosts: usize = self.ghosts.iter().map(|(positions, _)| positions.len()).sum();
         let mut known = vec![0.0; self.owned_positions.len() + ghosts];
@@ -208,7 +214,8 @@ impl Distribution {
 mod tests {
     use super::*;
 
-    /// Three nodes on a line slide and turn. The rigid part of a displacement is taken out, and forces get the work that they should do.
+    /// Three nodes on a line slide and turn. The rigid part of a displacement is taken out, and forces get the work
+    /// that they should do.
     #[test]
     fn rigid_parts_are_taken_out() {
         let motions = vec![vec![1.0, 0.0, 1.0, 0.0, 1.0, 0.0], vec![0.5, 0.5, 0.5, 0.0, 0.5, -0.5]];

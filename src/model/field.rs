@@ -1,5 +1,5 @@
-//! Vectors over all bodies (iterates, corrections, search directions), and the functional F1 along a line with an exact line search. F1
-//! is convex.
+//! Vectors over all bodies (iterates, corrections, search directions), and the functional F1 along a line with an exact
+//! line search. F1 is convex.
 
 use super::body::{Body, Energy};
 use super::layer::Layer;
@@ -8,8 +8,8 @@ use crate::linalg::{axpy, dot};
 
 /// Displacements v + E a of all bodies, with rigid motions E that supports and springs leave free.
 ///
-/// Steps and directions have all of B (v + E a) in their traces. Iterates have only B v: the closings B E a are in the gap of the model ([`Field::advance`]), which
-/// then has the digits of compressions, however far bodies fall.
+/// Steps and directions have all of B (v + E a) in their traces. Iterates have only B v: the closings B E a are in the
+/// gap of the model ([`Field::advance`]), which then has the digits of compressions, however far bodies fall.
 #[derive(Debug, Clone, Default)]
 pub struct Field {
     /// v, the displacements of each local body without their rigid parts; empty for a body of another rank.
@@ -47,9 +47,9 @@ impl Field {
         }
     }
 
-    /// Return the step with the displacements u + E a of the local bodies, and the sums over ranks of `more` numbers. u may have rigid parts; a are the amounts
-    /// `apart` of the motions of each local body, or empty where all is in u. One message, so that all ranks have the same numbers although their processors may
-    /// round differently.
+    /// Return the step with the displacements u + E a of the local bodies, and the sums over ranks of `more` numbers. u
+    /// may have rigid parts; a are the amounts `apart` of the motions of each local body, or empty where all is in u.
+    /// One message, so that all ranks have the same numbers although their processors may round differently.
     pub fn of_step(model: &Model, displacements: Vec<Vec<f64>>, apart: &[Vec<f64>], more: &[f64]) -> (Field, Vec<f64>) {
         let (mut field, mut fallen) = (Field { displacements, ..Self::zero(model) }, Self::zero(model).rigid);
         field.trace_here(model);
@@ -103,8 +103,8 @@ impl Field {
         model.close_gap(&falling);
     }
 
-    /// Recompute the traces B v from the displacements. Steps are added to both separately, so that they come to differ by the rounding of large steps.
-    /// Collective.
+    /// Recompute the traces B v from the displacements. Steps are added to both separately, so that they come to differ
+    /// by the rounding of large steps. Collective.
     pub fn retrace(&mut self, model: &Model) {
         self.trace_here(model);
         model.exchange.sum(&mut self.trace);
@@ -132,7 +132,8 @@ pub fn local_dot(x: &[Vec<f64>], y: &[Vec<f64>]) -> f64 {
     x.iter().zip(y).map(|(x, y)| dot(x, y)).sum()
 }
 
-/// Return the residual r = f - K u - B' `force` (26) of every local body, for forces at the points (n), and the sum of the energies of u. `products` are K u.
+/// Return the residual r = f - K u - B' `force` (26) of every local body, for forces at the points (n), and the sum of
+/// the energies of u. `products` are K u.
 pub fn residual(model: &Model, products: Vec<Vec<f64>>, u: &Field, force: &[f64]) -> (Vec<Vec<f64>>, Energy) {
     let mut sum = Energy::default();
     let of_body = |(index, product): (usize, Vec<f64>)| {
@@ -152,8 +153,9 @@ pub fn residual(model: &Model, products: Vec<Vec<f64>>, u: &Field, force: &[f64]
     (all, sum)
 }
 
-/// Return the squared energy norm of unbalanced forces r of the local bodies, taken for each dof alone: r'D^-1 r with the diagonal D of
-/// K + B' diag(`springs`) B, for springs omega kappa at the points (n). The caller adds the sums of all ranks.
+/// Return the squared energy norm of unbalanced forces r of the local bodies, taken for each dof alone: r'D^-1 r with
+/// the diagonal D of K + B' diag(`springs`) B, for springs omega kappa at the points (n). The caller adds the sums of
+/// all ranks.
 pub fn unbalanced(model: &Model, r: &[Vec<f64>], springs: &[f64]) -> f64 {
     model.locals().map(|(index, body)| body.unbalanced(&r[index], &model.at_rows(index, springs))).sum()
 }
@@ -183,7 +185,8 @@ pub struct LineEnergy<'a> {
 pub struct Unbounded;
 
 impl<'a> LineEnergy<'a> {
-    /// Return the line from an iterate with the layer state `layer` and the equilibrium residual `r` along `v`, with the products `kv` = K v. One message.
+    /// Return the line from an iterate with the layer state `layer` and the equilibrium residual `r` along `v`, with
+    /// the products `kv` = K v. One message.
     pub fn new(model: &'a Model, layer: &'a Layer, r: &[Vec<f64>], v: &Field, kv: &[Vec<f64>]) -> Self {
         let mut sums = [local_dot(r, &v.displacements), local_dot(kv, &v.displacements)];
         model.exchange.sum(&mut sums);
@@ -207,8 +210,8 @@ impl<'a> LineEnergy<'a> {
         if sum.is_nan() { f64::INFINITY } else { sum }
     }
 
-    /// Return the minimiser t >= 0 of F1 along the line, or 0 if F1 does not decrease along it. `accuracy` is that of the derivative, relative to the derivative
-    /// at 0.
+    /// Return the minimiser t >= 0 of F1 along the line, or 0 if F1 does not decrease along it. `accuracy` is that of
+    /// the derivative, relative to the derivative at 0.
     ///
     /// # Errors
     /// [`Unbounded`] if F1 still decreases at the longest step.
@@ -217,8 +220,9 @@ impl<'a> LineEnergy<'a> {
     }
 }
 
-/// Step, as a multiple of the first one, beyond which nothing stops a motion. With a law p = c^10, a load of 1e-100 moves a body 1e90 times as far as the
-/// springs of a first step do. Squares of longer steps leave the range of numbers.
+/// Step, as a multiple of the first one, beyond which nothing stops a motion. With a law p = c^10, a load of 1e-100
+/// moves a body 1e90 times as far as the springs of a first step do. Squares of longer steps leave the range of
+/// numbers.
 const LONGEST: f64 = 1e150;
 
 /// A point (t, f(t)) of a function f, and the value that the secant rule uses in place of f(t).
@@ -235,7 +239,8 @@ impl SearchPoint {
     }
 }
 
-/// Return the zero t >= 0 of an increasing function with the value `start` at 0, or 0 if `start` is not negative. `accuracy` is relative to `start`.
+/// Return the zero t >= 0 of an increasing function with the value `start` at 0, or 0 if `start` is not negative.
+/// `accuracy` is relative to `start`.
 ///
 /// # Errors
 /// [`Unbounded`] if the function is still negative at the longest step.
@@ -252,8 +257,9 @@ pub fn zero(value: impl Fn(f64) -> f64, start: f64, accuracy: f64) -> Result<f64
         low = high;
         high = SearchPoint::new(4.0 * high.t, value(4.0 * high.t));
     }
-    // Illinois variant of the secant rule, with bisection where a law is too steep for it: halving a value of a thousand times the other takes ten secants.
-    // Every third step halves the interval at least, so that 200 are more than the 53 bits of t need.
+    // Illinois variant of the secant rule, with bisection where a law is too steep for it: halving a value of a
+    // thousand times the other takes ten secants. Every third step halves the interval at least, so that 200 are more
+    // than the 53 bits of t need.
     for _ in 0..200 {
         if high.value <= target {
             return Ok(high.t);

@@ -1,9 +1,10 @@
-//! The Newton matrix (35) of all bodies together: K + B' diag(omega kappa) B with B = [B_a B_b], factored as one. omega is the area of a contact
-//! point, kappa the tangent of its layer's law.
+//! The Newton matrix (35) of all bodies together: K + B' diag(omega kappa) B with B = [B_a B_b], factored as one. omega
+//! is the area of a contact point, kappa the tangent of its layer's law.
 //!
-//! With whole bodies it is the reference for methods that decompose: the same functional with one big sparse factorisation. With
-//! condensed bodies it is small and dense, and cheaper than the sweeps that it saves. Where bodies are distributed over ranks, each
-//! rank owns some rows. Where whole bodies live on several ranks, as condensed ones do, every rank has the whole matrix and solves for itself.
+//! With whole bodies it is the reference for methods that decompose: the same functional with one big sparse
+//! factorisation. With condensed bodies it is small and dense, and cheaper than the sweeps that it saves. Where bodies
+//! are distributed over ranks, each rank owns some rows. Where whole bodies live on several ranks, as condensed ones
+//! do, every rank has the whole matrix and solves for itself.
 
 use super::border::{self, Border, BorderMotion};
 use super::coarse::RigidSpace;
@@ -21,10 +22,11 @@ use std::ops::Range;
 
 /// The linear step with one matrix of all bodies.
 ///
-/// Layers may be far softer than the rounding of K, which resists rigid motions E of a free body by that. So where a matrix is factored, some dofs of each body
-/// are *pins*, as many as it has free motions. Its displacements are v + E a, v is zero at the pins, and a stands in their place among the unknowns. Since K E = 0, the
-/// rows of K for a are zero, exactly, and a contact row has B E there. All dofs of a rigid part are pins. A matrix of complete nodes has no rigid parts:
-/// they are eliminated around it ([`border`]).
+/// Layers may be far softer than the rounding of K, which resists rigid motions E of a free body by that. So where a
+/// matrix is factored, some dofs of each body are *pins*, as many as it has free motions. Its displacements are v + E
+/// a, v is zero at the pins, and a stands in their place among the unknowns. Since K E = 0, the rows of K for a are
+/// zero, exactly, and a contact row has B E there. All dofs of a rigid part are pins. A matrix of complete nodes has no
+/// rigid parts: they are eliminated around it ([`border`]).
 pub struct JointStep {
     matrix: SpringMatrix,
     /// B of all bodies: one row [B_a B_b] for each contact point, also for those of other ranks.
@@ -50,10 +52,11 @@ pub struct JointStep {
 }
 
 impl JointStep {
-    /// Join the bodies of a model. `make` makes a solver of their K; with `is_dense` it gets all entries of K, row by row.
+    /// Join the bodies of a model. `make` makes a solver of their K; with `is_dense` it gets all entries of K, row by
+    /// row.
     ///
-    /// With `of_nodes` the bodies give their K away, and the unknowns are the displacements of nodes, as multigrid and distributed bodies need them. Otherwise
-    /// there are pins, and every rank has the whole matrix. Collective.
+    /// With `of_nodes` the bodies give their K away, and the unknowns are the displacements of nodes, as multigrid and
+    /// distributed bodies need them. Otherwise there are pins, and every rank has the whole matrix. Collective.
     ///
     /// # Errors
     /// More entries than 32 bits can count, a body that needs its K, and failures of the solver library.
@@ -85,8 +88,8 @@ impl JointStep {
         Ok(Self { matrix, rows, offset, pins, first, is_redundant, has_stiffness, earlier, rigid, motions, border })
     }
 
-    /// Solve G x = r with the matrix until `enough` accepts an iterate. Return the estimated energy norm of the error of x, by an iterative solver, or why the
-    /// solver gave up.
+    /// Solve G x = r with the matrix until `enough` accepts an iterate. Return the estimated energy norm of the error
+    /// of x, by an iterative solver, or why the solver gave up.
     fn solve_matrix(
         &mut self,
         model: &Model,
@@ -170,12 +173,12 @@ impl JointStep {
         load
     }
 
-    /// Return v and the amounts a of each local body from the unknowns of the matrix, for its displacements v + E a. `like` has a vector of each local body.
+    /// Return v and the amounts a of each local body from the unknowns of the matrix, for its displacements v + E a.
+    /// `like` has a vector of each local body.
     fn displacements(&self, x: &[f64], like: &[Vec<f64>]) -> [Vec<Vec<f64>>; 2] {
         let mut all = self.apart(x, like);
-        let amounts = all.iter_mut().zip(&self.pins).map(|(u, pins)| match u.is_empty() {
-            true => Vec::new(),
-            false => pins.iter().map(|&pin| std::mem::take(&mut u[pin])).collect(),
+        let amounts = all.iter_mut().zip(&self.pins).map(|(u, pins)| {
+            if u.is_empty() { Vec::new() } else { pins.iter().map(|&pin| std::mem::take(&mut u[pin])).collect() }
         });
         let amounts = amounts.collect();
         [all, amounts]
@@ -311,7 +314,8 @@ fn rigid_traces(model: &Model) -> Vec<Vec<Vec<f64>>> {
     model.bodies.iter().filter(|slot| slot.is_rigid).map(of_part).collect()
 }
 
-/// Return B x at the points, n, and x'r, the squared energy norm of an iterate x. `x` and `r` have the rows of this rank, from number `first` on. One message.
+/// Return B x at the points, n, and x'r, the squared energy norm of an iterate x. `x` and `r` have the rows of this
+/// rank, from number `first` on. One message.
 fn closing_and_energy(model: &Model, rows: &Csr, first: usize, x: &[f64], r: &[f64]) -> (Vec<f64>, f64) {
     let owned = |q: usize| rows.row(q).filter_map(|(i, b)| Some(b * x.get(i.checked_sub(first)?)?)).sum();
     let mut closing: Vec<f64> = (0..model.points()).map(owned).collect();
@@ -379,10 +383,8 @@ fn no_matrices() -> Error {
 
 /// Return the K that each body gives away.
 fn given(model: &mut Model) -> Result<Vec<Csr>> {
-    let give = |slot: &mut BodySlot| match slot.is_rigid {
-        true => Some(Csr::new(0)),
-        false => slot.local.as_mut()?.give_stiffness(),
-    };
+    let give =
+        |slot: &mut BodySlot| if slot.is_rigid { Some(Csr::new(0)) } else { slot.local.as_mut()?.give_stiffness() };
     model.bodies.iter_mut().map(give).collect::<Option<_>>().ok_or_else(no_matrices)
 }
 
@@ -431,7 +433,8 @@ impl<'a> Layout<'a> {
         Self { model, parts, distributions, offset, pins, start: shared.map(|shared| shared.start), total }
     }
 
-    /// Return B of all bodies together, and the columns, sorted, that its products couple in the rows of this rank, by the number of the row there.
+    /// Return B of all bodies together, and the columns, sorted, that its products couple in the rows of this rank, by
+    /// the number of the row there.
     fn contact_rows(&self) -> (Csr, HashMap<usize, Vec<i32>>) {
         let first = self.start.unwrap_or(0);
         let owned = first..first + self.offset[self.parts.len()];
@@ -519,7 +522,8 @@ fn merge(entries: &mut Vec<(usize, f64)>) {
     });
 }
 
-/// Append a row with the entries (column, value) `known` and with zeros at the other ones of `columns`. Both are sorted by column.
+/// Append a row with the entries (column, value) `known` and with zeros at the other ones of `columns`. Both are sorted
+/// by column.
 fn push_merged(matrix: &mut Csr, known: impl Iterator<Item = (i32, f64)>, columns: &[i32]) {
     let mut known = known.peekable();
     let mut push = |column: i32, value: f64| {
@@ -536,8 +540,8 @@ fn push_merged(matrix: &mut Csr, known: impl Iterator<Item = (i32, f64)>, column
     matrix.ptr.push(matrix.col.len() as i32);
 }
 
-/// Return as many dofs as there are motions, such that no combination of the motions leaves all these dofs at rest. They are the pivots of an
-/// elimination.
+/// Return as many dofs as there are motions, such that no combination of the motions leaves all these dofs at rest.
+/// They are the pivots of an elimination.
 fn pins(motions: &[Vec<f64>]) -> Vec<usize> {
     let mut remaining = motions.to_vec();
     let mut pins = Vec::new();

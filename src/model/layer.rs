@@ -1,9 +1,9 @@
-//! The state of the layers: compression and pressure of every contact point, on its law, and the stiffness per area of the surfaces
-//! beside them.
+//! The state of the layers: compression and pressure of every contact point, on its law, and the stiffness per area of
+//! the surfaces beside them.
 //!
-//! The law of a point is a curve in the plane of compression c and pressure p: p = 0 for c <= 0, p = p(c) above. Newton's method
-//! keeps a state (c_q, p_q) on this curve, where c_q may differ from the compression that the traces of the bodies give. Robin sweeps take the state at
-//! that compression.
+//! The law of a point is a curve in the plane of compression c and pressure p: p = 0 for c <= 0, p = p(c) above.
+//! Newton's method keeps a state (c_q, p_q) on this curve, where c_q may differ from the compression that the traces of
+//! the bodies give. Robin sweeps take the state at that compression.
 
 use super::Model;
 use crate::contact::law;
@@ -25,7 +25,8 @@ pub struct Layer {
     pub work: f64,
     /// Number of points with c > 0.
     pub closed: usize,
-    /// mu, n: energy per area by which the laws are smoothed ([`law::resolve`]); empty for the laws themselves. With smoothed laws `energy` is zero.
+    /// mu, n: energy per area by which the laws are smoothed ([`law::resolve`]); empty for the laws themselves. With
+    /// smoothed laws `energy` is zero.
     pub smoothing: Vec<f64>,
 }
 
@@ -62,10 +63,11 @@ impl Layer {
         Self::new(model, model.compression(trace))
     }
 
-    /// Return the resolvents of the laws (Minty): the states (c_q, p_q) on the laws with c_q + p_q/rho_q = c + p/rho_q. Compression c and pressure p, n each,
-    /// are those that the linear model of the layers gave, and `rho`, n, is a stiffness per area. There is one such state on each law, and it moves by no more
-    /// than the right-hand side does, however steep or flat the law is. Laws are smoothed by `smoothing`, an energy per area at each point, n; empty for the
-    /// laws themselves.
+    /// Return the resolvents of the laws (Minty): the states (c_q, p_q) on the laws with c_q + p_q/rho_q = c + p/rho_q.
+    /// Compression c and pressure p, n each, are those that the linear model of the layers gave, and `rho`, n, is a
+    /// stiffness per area. There is one such state on each law, and it moves by no more than the right-hand side does,
+    /// however steep or flat the law is. Laws are smoothed by `smoothing`, an energy per area at each point, n; empty
+    /// for the laws themselves.
     pub fn resolve(model: &Model, compression: &[f64], pressure: &[f64], rho: &[f64], smoothing: &[f64]) -> Self {
         let sum = |q: usize| compression[q] + pressure[q] / rho[q];
         if smoothing.is_empty() {
@@ -100,9 +102,10 @@ impl Layer {
     }
 }
 
-/// Stiffness of an elastic foundation over E*/a, in the plane and in space. E* is the modulus of the contact, and a its half width or radius. With 1.18 and 1.70 it has
-/// the contact of Hertz (Johnson, Contact Mechanics, 1985, section 4.3). With 0.7 of that the contact of spheres is an eighth wider, because steps that open
-/// points are better than steps that close them: spheres and cylinders took the fewest steps at this factor, among 0.3 to 1.2.
+/// Stiffness of an elastic foundation over E*/a, in the plane and in space. E* is the modulus of the contact, and a its
+/// half width or radius. With 1.18 and 1.70 it has the contact of Hertz (Johnson, Contact Mechanics, 1985, section
+/// 4.3). With 0.7 of that the contact of spheres is an eighth wider, because steps that open points are better than
+/// steps that close them: spheres and cylinders took the fewest steps at this factor, among 0.3 to 1.2.
 const FOUNDATION: [f64; 2] = [0.7 * 1.18, 0.7 * 1.70];
 
 /// Return rho0, n: the stiffness per area of the two bodies in series, for contact all over their surfaces.
@@ -110,8 +113,8 @@ pub fn surface_slopes(model: &Model) -> Vec<f64> {
     contact_slopes(model, |_| true)
 }
 
-/// Return the stiffness per area of the two bodies in series, n, for contact at the points that are `closed`. Each body deforms as over its depth, or as
-/// over its contact if that is smaller.
+/// Return the stiffness per area of the two bodies in series, n, for contact at the points that are `closed`. Each body
+/// deforms as over its depth, or as over its contact if that is smaller.
 pub fn contact_slopes(model: &Model, closed: impl Fn(usize) -> bool) -> Vec<f64> {
     let (points, rows) = (model.points(), model.row_stiffness());
     // `foundation` is the stiffness per area of the contact over the modulus
@@ -145,8 +148,9 @@ pub fn in_series(a: f64, b: f64) -> f64 {
     (a.recip() + b.recip()).recip()
 }
 
-/// Factor on the stiffness of the nodes under a point that gives the slope rho of the resolvents in Newton's method. Any slope leads to the same solution.
-/// With this factor random scenes took the fewest steps; with 0.003 to 1 they took three per cent more at most, and with 3 some came into cycles.
+/// Factor on the stiffness of the nodes under a point that gives the slope rho of the resolvents in Newton's method.
+/// Any slope leads to the same solution. With this factor random scenes took the fewest steps; with 0.003 to 1 they
+/// took three per cent more at most, and with 3 some came into cycles.
 const SLOPE: f64 = 0.1;
 
 /// Return rho, n: `SLOPE` times the stiffness per area of the softer of the two surfaces, as their elements have it.
@@ -154,7 +158,8 @@ pub fn meeting_slopes(model: &Model) -> Vec<f64> {
     let points = model.points();
     let rows = model.row_stiffness();
     let slope = |q: usize| {
-        // a row without stiffness has prescribed dofs only, so the other side alone moves; without stiffness on both, rho is infinite and the resolvent is at c
+        // a row without stiffness has prescribed dofs only, so the other side alone moves; without stiffness on both,
+        // rho is infinite and the resolvent is at c
         let sides = [rows[q], rows[points + q]].into_iter().filter(|stiffness| *stiffness > 0.0);
         let softer = sides.fold(f64::INFINITY, f64::min) / model.area[q];
         SLOPE * softer
@@ -206,7 +211,8 @@ mod tests {
         assert_eq!(smoothed.smoothing, mu);
     }
 
-    /// A slope is a tenth of the stiffness of the softer side over the area. A row without stiffness is one of prescribed dofs.
+    /// A slope is a tenth of the stiffness of the softer side over the area. A row without stiffness is one of
+    /// prescribed dofs.
     #[test]
     fn slopes_are_those_of_the_softer_side() {
         let slopes = meeting_slopes(&two_pairs());

@@ -1,8 +1,8 @@
 //! The linear step: (K + B' diag(omega kappa) B) x = r over all bodies (35).
 //!
-//! How it is solved is a choice of the inner solver, not a method of its own. There may be one dense matrix of condensed bodies, one sparse
-//! factorisation, or conjugate gradients with a multigrid of all bodies or with the Robin sweep (`robin::SweepCg`). A new way is a new
-//! file with an implementation of [`LinearStep`].
+//! How it is solved is a choice of the inner solver, not a method of its own. There may be one dense matrix of
+//! condensed bodies, one sparse factorisation, or conjugate gradients with a multigrid of all bodies or with the Robin
+//! sweep (`robin::SweepCg`). A new way is a new file with an implementation of [`LinearStep`].
 
 use super::Model;
 use super::field::Field;
@@ -24,7 +24,8 @@ pub struct System<'a> {
     pub enough: &'a mut StoppingTest<'a>,
 }
 
-/// A stopping test of iterative solvers: it is called after each iteration, with the same numbers on all ranks, and returns whether the solver may stop.
+/// A stopping test of iterative solvers: it is called after each iteration, with the same numbers on all ranks, and
+/// returns whether the solver may stop.
 pub type StoppingTest<'a> = dyn FnMut(&Model, &Trial) -> bool + 'a;
 
 /// The iterate x of an iterative solver.
@@ -74,8 +75,8 @@ pub trait LinearStep {
     /// Return the name in the table and the report.
     fn name(&self) -> &'static str;
 
-    /// Set up the solver for the first step with these springs omega kappa at the points, n. A refusal of the solver or of an
-    /// option then comes before that step.
+    /// Set up the solver for the first step with these springs omega kappa at the points, n. A refusal of the solver or
+    /// of an option then comes before that step.
     ///
     /// # Errors
     /// Failures of the solver library.
@@ -106,8 +107,8 @@ pub trait LinearStep {
     /// Failures of the solver library. A solver that does not reach its tolerance is reported in [`LinearResult`].
     fn solve(&mut self, system: System) -> Result<LinearResult>;
 
-    /// Return the largest relative error with which a step is taken. Newton's method converges with any relative error below one, but more slowly the
-    /// larger it is (Dembo, Eisenstat, Steihaug, Inexact Newton methods, 1982).
+    /// Return the largest relative error with which a step is taken. Newton's method converges with any relative error
+    /// below one, but more slowly the larger it is (Dembo, Eisenstat, Steihaug, Inexact Newton methods, 1982).
     fn roughest(&self) -> f64 {
         0.5
     }

@@ -1,8 +1,9 @@
 //! The discrete problem as the methods see it: bodies, and arrays over contact points.
 //!
-//! Contact points of all pairs are numbered consecutively: point q of pair i has the number `offset[i] + q`. An array with one entry for each point is marked
-//! n. A trace vector (2n) has two entries a point, first all of side a, then all of side b: `trace[side * points + offset[pair] + q]`.
-//! A body is local if it lives on this rank, wholly or in part.
+//! Contact points of all pairs are numbered consecutively: point q of pair i has the number `offset[i] + q`. An array
+//! with one entry for each point is marked n. A trace vector (2n) has two entries a point, first all of side a, then
+//! all of side b: `trace[side * points + offset[pair] + q]`. A body is local if it lives on this rank, wholly or in
+//! part.
 
 pub mod body;
 mod border;
@@ -65,11 +66,13 @@ pub struct Mechanism {
     pub work: f64,
     /// The part of a support that would hold the motion, if loads work on it.
     pub support: String,
-    /// The work of the loads, as such a share, that was taken from them, if it is more than the digits of the mesh allow for.
+    /// The work of the loads, as such a share, that was taken from them, if it is more than the digits of the mesh
+    /// allow for.
     pub balanced: f64,
     /// Whether contact resists it, by no more than facets may by mistake.
     pub by_facets: bool,
-    /// The body that was fixed at one node to remove the motion; `None` if loads do work on it, or if there is no suitable node outside the contact.
+    /// The body that was fixed at one node to remove the motion; `None` if loads do work on it, or if there is no
+    /// suitable node outside the contact.
     pub fixed: Option<usize>,
 }
 
@@ -82,10 +85,11 @@ pub struct Sprung {
     pub stiffness: DMatrix<f64>,
 }
 
-/// A body in the model, or a rigid part. Every rank has the arrays; only the ranks where the body lives have the body itself.
+/// A body in the model, or a rigid part. Every rank has the arrays; only the ranks where the body lives have the body
+/// itself.
 ///
-/// A rigid part has no mesh, and its dofs are the amounts of its free motions: an obstacle before a surface, or the offset of a gap. It is at side b of its
-/// pair, alone or beside the body there, and rank 0 has it.
+/// A rigid part has no mesh, and its dofs are the amounts of its free motions: an obstacle before a surface, or the
+/// offset of a gap. It is at side b of its pair, alone or beside the body there, and rank 0 has it.
 #[derive(Serialize, Deserialize)]
 pub struct BodySlot {
     /// Name in the scene.
@@ -131,12 +135,14 @@ impl BodySlot {
         }
     }
 
-    /// Return the work of the loads and of forces at the contact rows, which push the body away, on each of its free motions.
+    /// Return the work of the loads and of forces at the contact rows, which push the body away, on each of its free
+    /// motions.
     pub fn works(&self, force: &[f64]) -> Vec<f64> {
         self.motions.iter().map(|motion| motion.work - dot(&motion.trace, force)).collect()
     }
 
-    /// Return how the dofs of the body are distributed over the ranks; `None` for a body of one rank, and for one that does not live here.
+    /// Return how the dofs of the body are distributed over the ranks; `None` for a body of one rank, and for one that
+    /// does not live here.
     pub fn distribution(&self) -> Option<&Distribution> {
         self.local.as_ref()?.dofs().distribution.as_deref()
     }
@@ -209,8 +215,9 @@ impl Model {
         all
     }
 
-    /// Return the stiffness by which the sweeps hold bodies at every contact row, as a trace vector (2n): that of the nodes under the row, or, for a
-    /// rigid part, of those before it; that of a unit spring where supports prescribe those.
+    /// Return the stiffness by which the sweeps hold bodies at every contact row, as a trace vector (2n): that of the
+    /// nodes under the row, or, for a rigid part, of those before it; that of a unit spring where supports prescribe
+    /// those.
     pub fn holding_stiffness(&self) -> Vec<f64> {
         let (points, mut all) = (self.points(), self.row_stiffness());
         for segment in self.bodies.iter().filter(|slot| slot.is_rigid).flat_map(|slot| &slot.segments) {
@@ -232,7 +239,8 @@ impl Model {
         self.bodies.iter().filter(|slot| !slot.is_rigid).count()
     }
 
-    /// Return by how much rigid parts close each point of pair `i`, n, with these amounts of their motions, one list a body.
+    /// Return by how much rigid parts close each point of pair `i`, n, with these amounts of their motions, one list a
+    /// body.
     pub fn rigid_closing(&self, i: usize, amounts: &[Vec<f64>]) -> Vec<f64> {
         let mut closing = vec![0.0; self.range(i).len()];
         for (slot, amounts) in
@@ -271,7 +279,8 @@ impl Model {
         self.pairs.iter().enumerate().flat_map(of_pair)
     }
 
-    /// Return the outer normal displacements of a side of pair `i`, one for each of its points: those of `trace`, and the prescribed ones.
+    /// Return the outer normal displacements of a side of pair `i`, one for each of its points: those of `trace`, and
+    /// the prescribed ones.
     pub fn displacement(&self, trace: &[f64], i: usize, side: usize) -> Vec<f64> {
         let free = &trace[side * self.points()..][self.range(i)];
         free.iter().zip(&self.pairs[i].prescribed[side]).map(|(free, prescribed)| free + prescribed).collect()
@@ -307,7 +316,8 @@ impl Model {
         }
     }
 
-    /// Add values at the rows of a body to a trace vector. Unlike other bodies, a rigid part may share rows with a body.
+    /// Add values at the rows of a body to a trace vector. Unlike other bodies, a rigid part may share rows with a
+    /// body.
     pub fn add(&self, body: usize, rows: &[f64], trace: &mut [f64]) {
         let mut next = 0;
         for range in self.trace_ranges(body) {
@@ -395,7 +405,8 @@ pub(crate) mod sample {
         }
     }
 
-    /// Return two bodies with two pairs of two points each. The law is p = 4 c in the first pair and p = c^2 in the second.
+    /// Return two bodies with two pairs of two points each. The law is p = 4 c in the first pair and p = c^2 in the
+    /// second.
     pub fn two_pairs() -> Model {
         let laws: [Rc<dyn LayerLaw>; 2] = [Rc::new(LinearLaw { stiffness: 4.0 }), Rc::new(Square([1.0; 2]))];
         let pair = |(i, law): (usize, Rc<dyn LayerLaw>)| ContactPair {

@@ -1,7 +1,7 @@
 //! The free rigid motions E of all bodies together, as they close the contact points: B E.
 //!
-//! Motions are numbered consecutively, body by body. Since K E = 0, E'(K + B'DB) z takes only sums over contact points. Combinations that no contact
-//! resists are the kernel of [`Motions::springs`], up to [`TOLERANCE`].
+//! Motions are numbered consecutively, body by body. Since K E = 0, E'(K + B'DB) z takes only sums over contact points.
+//! Combinations that no contact resists are the kernel of [`Motions::springs`], up to [`TOLERANCE`].
 
 use super::{BodySlot, Model, Motion, Segment};
 use crate::linalg::{Blocks, axpy, dot};
@@ -40,7 +40,8 @@ pub struct NamedMotion {
 }
 
 impl<'a> Motions<'a> {
-    /// Return the motions of bodies with these contact rows and free motions. `points` are the numbers of points of the pairs.
+    /// Return the motions of bodies with these contact rows and free motions. `points` are the numbers of points of the
+    /// pairs.
     pub fn new(bodies: impl IntoIterator<Item = (&'a [Segment], &'a [Motion])>, points: &[usize]) -> Self {
         let (mut first, mut all, mut next) = (vec![0], Vec::new(), 0);
         let mut pairs: Vec<Vec<PairSide>> = points.iter().map(|_| Vec::new()).collect();
@@ -106,7 +107,8 @@ impl<'a> Motions<'a> {
         ground
     }
 
-    /// Return (B E)' diag(`stiffness`) (B E) for springs at the points, one entry a point. The matrix has a row and column of blocks for each body.
+    /// Return (B E)' diag(`stiffness`) (B E) for springs at the points, one entry a point. The matrix has a row and
+    /// column of blocks for each body.
     pub fn springs(&self, stiffness: &[f64]) -> Blocks {
         let mut springs = self.blocks();
         for sides in self.pairs.iter().filter(|sides| !sides.is_empty()) {
@@ -192,7 +194,8 @@ impl<'a> Motions<'a> {
         sizes
     }
 
-    /// Return each trace by which a motion closes a pair: (points of the pair, number of the motion, its trace at these points).
+    /// Return each trace by which a motion closes a pair: (points of the pair, number of the motion, its trace at these
+    /// points).
     fn traces(&self) -> impl Iterator<Item = (&Range<usize>, usize, &'a [f64])> {
         self.pairs.iter().flatten().flat_map(move |side| {
             let traces = self.of_body(side.body).zip(&side.traces);
@@ -232,7 +235,8 @@ mod tests {
         Motion { name: name.into(), trace: trace.to_vec(), work: 0.0 }
     }
 
-    /// Two blocks lie side by side on the ground, with pair 0 between them. The trace by which the second slides on the ground has a rounding error.
+    /// Two blocks lie side by side on the ground, with pair 0 between them. The trace by which the second slides on the
+    /// ground has a rounding error.
     #[test]
     fn springs_are_those_of_motions_that_close_points() {
         let segment = |pair, side| Segment { pair, side };

@@ -36,21 +36,23 @@ impl Axis {
     /// Return an axis that shows all these values.
     pub fn new(values: &[f64], log: bool) -> Self {
         let ends = values.iter().copied().reduce(f64::min).zip(values.iter().copied().reduce(f64::max));
-        match log {
-            true => Self::logarithmic(ends),
-            false => Self::linear(ends.unwrap_or((0.0, 1.0)), values.iter().all(|value| value.fract() == 0.0)),
+        if log {
+            Self::logarithmic(ends)
+        } else {
+            Self::linear(ends.unwrap_or((0.0, 1.0)), values.iter().all(|value| value.fract() == 0.0))
         }
     }
 
-    /// Return a logarithmic axis. It begins and ends at a power of ten, or at a multiple of one if it has fewer than three of them, since
-    /// other numbers have labels then, too.
+    /// Return a logarithmic axis. It begins and ends at a power of ten, or at a multiple of one if it has fewer than
+    /// three of them, since other numbers have labels then, too.
     fn logarithmic(ends: Option<(f64, f64)>) -> Self {
         let (low, high) = ends.map_or((0.0, 1.0), |(low, high)| (low.log10(), high.log10()));
         let digit = |log: f64| 10f64.powf(log - log.floor()).floor();
         let is_divided = high - low.floor() < 2.0;
-        let ends = match is_divided {
-            true => [low.floor() + digit(low).log10(), high.floor() + (digit(high) + 1.0).log10()],
-            false => [low.floor(), high.ceil()],
+        let ends = if is_divided {
+            [low.floor() + digit(low).log10(), high.floor() + (digit(high) + 1.0).log10()]
+        } else {
+            [low.floor(), high.ceil()]
         };
         let powers = ends[0].floor() as i32..=ends[1].ceil() as i32;
         let every = (ends[1] - ends[0]) as i32 / TICKS as i32 + 1;

@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 
 /// The kind of the cells of a body: simplices of a dimension (1 to 3) and an order, which is at most 2 in space.
 ///
-/// Their points are numbered as in VTK: vertices, then those inside the edges 01 12 02 03 13 23, equally spaced and from order three on along 01 12 20,
-/// then those inside the triangle.
+/// Their points are numbered as in VTK: vertices, then those inside the edges 01 12 02 03 13 23, equally spaced and
+/// from order three on along 01 12 20, then those inside the triangle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CellKind {
     /// Dimension of the simplices.

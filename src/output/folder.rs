@@ -1,5 +1,5 @@
-//! The folder of results. One run at a time writes to it, no file is left half written, and a run removes and replaces only files that this
-//! program has made, which it knows by what stands in them.
+//! The folder of results. One run at a time writes to it, no file is left half written, and a run removes and replaces
+//! only files that this program has made, which it knows by what stands in them.
 
 use crate::error::{Error, Kind, Result};
 use serde_json::Value;
@@ -72,7 +72,8 @@ pub fn refuse_foreign(path: &Path) -> Result<()> {
     ))
 }
 
-/// A locked folder. A child of the process that has not begun its own program yet has the file, too, and closing it would leave the lock to the child.
+/// A locked folder. A child of the process that has not begun its own program yet has the file, too, and closing it
+/// would leave the lock to the child.
 #[derive(Debug)]
 struct Lock(File);
 
@@ -97,7 +98,8 @@ impl Folder {
     /// Open the folder as [`Self::create`] does, and lock it for one run until this value is dropped.
     ///
     /// # Errors
-    /// Those of [`Self::create`], and [`Kind::File`] while another process has the folder. A file system without locks has none.
+    /// Those of [`Self::create`], and [`Kind::File`] while another process has the folder. A file system without locks
+    /// has none.
     pub fn claim(path: impl AsRef<Path>) -> Result<Self> {
         let folder = Self::create(path)?;
         let file = File::open(&folder.path).map_err(|cause| failed(&folder.path, &cause))?;
@@ -130,7 +132,8 @@ impl Folder {
         Ok(())
     }
 
-    /// Return the names of the files that the report of an earlier run lists, and last that of the report; none without a report of this program.
+    /// Return the names of the files that the report of an earlier run lists, and last that of the report; none without
+    /// a report of this program.
     fn listed(&self) -> Vec<String> {
         let path = self.path.join(REPORT);
         let text = fs::read(&path).ok().filter(|_| is_made(&path)).unwrap_or_default();
@@ -141,8 +144,8 @@ impl Folder {
         results.chain(own).collect()
     }
 
-    /// Check that a run can write files of these names, and that none of its `inputs` is one of them or a result of the last run, which would be
-    /// removed.
+    /// Check that a run can write files of these names, and that none of its `inputs` is one of them or a result of the
+    /// last run, which would be removed.
     ///
     /// # Errors
     /// A file of another origin has one of the names, [`STEPS`] is a link, or an input is a result.
@@ -234,7 +237,8 @@ pub fn make_folder(path: &Path) -> Result<()> {
     })
 }
 
-/// Write a whole file or nothing: fill a temporary file beside `path` and rename it. Only a file of this program is replaced.
+/// Write a whole file or nothing: fill a temporary file beside `path` and rename it. Only a file of this program is
+/// replaced.
 ///
 /// # Errors
 /// A file that cannot be written, and a path that something of another origin has.
@@ -277,8 +281,8 @@ pub(super) fn failed(path: &Path, cause: &io::Error) -> Error {
     Error::file(path, "write", cause).help(help)
 }
 
-/// Return `name` as a safe file name: characters other than letters, digits, `-`, `_` and `.` become `_`. An empty name, or
-/// one that begins with a dot, gets a `_` in front.
+/// Return `name` as a safe file name: characters other than letters, digits, `-`, `_` and `.` become `_`. An empty
+/// name, or one that begins with a dot, gets a `_` in front.
 pub fn safe_name(name: &str) -> String {
     let safe: String = name.chars().map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect();
     if safe.is_empty() || safe.starts_with('.') { format!("_{safe}") } else { safe }

@@ -1,7 +1,7 @@
 //! Everything the program writes: lines and tables on the terminal, and the files of a run; and the formats of numbers.
 //!
-//! Nothing here knows the space dimension: points and vectors have three components, with z = 0 in the plane. A function
-//! that writes to an `out` returns the errors of that writer.
+//! Nothing here knows the space dimension: points and vectors have three components, with z = 0 in the plane. A
+//! function that writes to an `out` returns the errors of that writer.
 
 mod axis;
 mod fields;
@@ -83,7 +83,8 @@ pub fn trimmed(text: &str) -> &str {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { text }
 }
 
-/// Escape a text for HTML and XML, between tags and in the value of an attribute. A character that XML does not allow becomes U+FFFD.
+/// Escape a text for HTML and XML, between tags and in the value of an attribute. A character that XML does not allow
+/// becomes U+FFFD.
 pub fn escape(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
     for c in text.chars() {

@@ -18,8 +18,9 @@ pub struct Report {
     pub ranks: usize,
     /// Title of the scene.
     pub title: String,
-    /// Status at the end of the run: `converged`, `roundoff-limited`, `stagnated`, `iteration-limit`, `not-finite`, `out-of-range`,
-    /// `underconstrained`, `unbounded`, `inner-solver`, `inaccurate`, `interrupted`, `mesh-limit`, `tolerance-unmet`.
+    /// Status at the end of the run: `converged`, `roundoff-limited`, `stagnated`, `iteration-limit`, `not-finite`,
+    /// `out-of-range`, `underconstrained`, `unbounded`, `inner-solver`, `inaccurate`, `interrupted`, `mesh-limit`,
+    /// `tolerance-unmet`.
     pub status: String,
     /// The status in words, with body and iteration where they matter.
     pub message: String,
@@ -61,16 +62,18 @@ pub struct Report {
     pub messages: usize,
     /// Load steps, if requested, the full load included.
     pub steps: Vec<StepReport>,
-    /// The number of the stopping test: the relative residual of sweeps, or the largest relative error of Newton's method.
+    /// The number of the stopping test: the relative residual of sweeps, or the largest relative error of Newton's
+    /// method.
     pub residual: Option<f64>,
     /// Bound of the relative error of the iteration in the energy norm, if there is one.
     pub error_bound: Option<f64>,
     /// Estimate of that error if there is no bound.
     pub error_estimate: Option<f64>,
-    /// Possible error of a pressure from rounding of gaps and displacements, relative to the largest pressure. The errors above do
-    /// not include it.
+    /// Possible error of a pressure from rounding of gaps and displacements, relative to the largest pressure. The
+    /// errors above do not include it.
     pub rounding: Option<f64>,
-    /// Energy norm of the forces f - K u - B' omega p of each node alone, computed with K itself, relative to the energy of bodies and layers.
+    /// Energy norm of the forces f - K u - B' omega p of each node alone, computed with K itself, relative to the
+    /// energy of bodies and layers.
     pub unbalanced: Option<f64>,
     /// Estimated errors of the discretisation, if requested.
     pub discretization_error: Option<EstimateReport>,
@@ -269,8 +272,8 @@ pub struct BalanceReport {
     pub supports: Vec<ForceReport>,
     /// Force of each spring.
     pub springs: Vec<ForceReport>,
-    /// Force of each rigid surface, with that of the supports of its nodes. Its moment keeps the surface from turning, or is that of the
-    /// loads on a surface that turns.
+    /// Force of each rigid surface, with that of the supports of its nodes. Its moment keeps the surface from turning,
+    /// or is that of the loads on a surface that turns.
     pub rigid: Vec<ForceReport>,
     /// Norm of the sum of all forces, relative to the sum of the norms of all nodal forces.
     pub force_imbalance: f64,
@@ -306,7 +309,8 @@ pub struct PairReport {
     pub moment: [[f64; 3]; 2],
     /// Approach of the bodies along the mean normal; null where normals cancel.
     pub approach: Option<f64>,
-    /// Sum of the pressures times their areas. It is not the resultant of `force` where normals differ, as around a shaft.
+    /// Sum of the pressures times their areas. It is not the resultant of `force` where normals differ, as around a
+    /// shaft.
     pub normal_force: f64,
     /// Mean pressure of the part in contact.
     pub mean_pressure: f64,
@@ -322,8 +326,8 @@ pub struct PairReport {
     /// Size of the contact, and of the part that both surfaces cover and that is open.
     #[serde(flatten)]
     pub extent: Extent,
-    /// Plane problems: points where contact begins or ends, from the pressure and the opening of the contact points on both sides
-    /// (docs/theory.md).
+    /// Plane problems: points where contact begins or ends, from the pressure and the opening of the contact points on
+    /// both sides (docs/theory.md).
     pub contact_ends: Vec<[f64; 3]>,
     /// The obstacle before the surface, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -413,8 +417,8 @@ pub struct StepPairReport {
     pub offset: Option<f64>,
 }
 
-/// The part of the common surface of a pair that is in contact, c > 0, and the part that is open, c < 0. They are lengths in
-/// the plane and areas in space; for bodies of revolution, they are areas of the whole circumference.
+/// The part of the common surface of a pair that is in contact, c > 0, and the part that is open, c < 0. They are
+/// lengths in the plane and areas in space; for bodies of revolution, they are areas of the whole circumference.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 #[allow(missing_docs)] // the names are those of the report
@@ -468,12 +472,12 @@ pub struct ReactionReport {
     pub force: [f64; 3],
 }
 
-/// Most bodies, pairs, load steps or warnings that the terminal lists, as many as a person looks through; the report has all. Unless
-/// the scene gives a number, as many pairs have files of their own.
+/// Most bodies, pairs, load steps or warnings that the terminal lists, as many as a person looks through; the report
+/// has all. Unless the scene gives a number, as many pairs have files of their own.
 pub const LISTED: usize = 24;
 
-/// Return the indices of the `most` pairs with the largest forces, in the order of the scene. Among equal forces the first is
-/// preferred; a force that is not finite counts as zero.
+/// Return the indices of the `most` pairs with the largest forces, in the order of the scene. Among equal forces the
+/// first is preferred; a force that is not finite counts as zero.
 pub fn busiest(pairs: &[PairReport], most: usize) -> Vec<usize> {
     let squared = |pair: &PairReport| pair.force[0].iter().map(|f| f * f).sum();
     let sizes: Vec<f64> =
@@ -544,7 +548,8 @@ impl RoundReport {
 }
 
 impl Report {
-    /// Return the closing lines of a run for the terminal. The table of adapted meshes is not among them: each mesh has its line when it ends.
+    /// Return the closing lines of a run for the terminal. The table of adapted meshes is not among them: each mesh has
+    /// its line when it ends.
     pub fn summary(&self, units: &UnitWords) -> String {
         let mut lines = vec![format!("{}: {}", self.title, self.message), self.counts()];
         lines.extend(self.discretization_line());
@@ -652,7 +657,8 @@ impl Report {
         largest(most(|body| body.max_displacement), most(|body| body.max_von_mises), "", units)
     }
 
-    /// Return a line per body on its extreme fields and its balance, or one line for many bodies; none before the first iterate.
+    /// Return a line per body on its extreme fields and its balance, or one line for many bodies; none before the first
+    /// iterate.
     fn balance_lines(&self, units: &UnitWords) -> Vec<String> {
         if self.residual.is_none() {
             return Vec::new();
@@ -675,7 +681,8 @@ impl Report {
     }
 }
 
-/// Return the words on the largest displacement and von Mises stress, followed by a semicolon; empty where a field is not known.
+/// Return the words on the largest displacement and von Mises stress, followed by a semicolon; empty where a field is
+/// not known.
 fn largest(displacement: Option<f64>, von_mises: Option<f64>, place: &str, units: &UnitWords) -> String {
     let (Some(displacement), Some(von_mises)) = (displacement, von_mises) else { return String::new() };
     if displacement == 0.0 && von_mises == 0.0 {
@@ -715,8 +722,8 @@ fn pair_line(pair: &PairReport, is_bonded: bool, units: &UnitWords) -> String {
     )
 }
 
-/// Return the words on the largest pressure, with its place and the mean pressure where they are given, and on the largest tension of a bond. A bond that only
-/// pulls has no pressure.
+/// Return the words on the largest pressure, with its place and the mean pressure where they are given, and on the
+/// largest tension of a bond. A bond that only pulls has no pressure.
 fn peaks(pressure: f64, more: Option<([f64; 3], f64)>, tension: Option<TensionReport>, units: &UnitWords) -> String {
     let stress = &units.stress;
     let tension = tension.filter(|tension| tension.peak_tension > 0.0);
@@ -733,8 +740,9 @@ fn peaks(pressure: f64, more: Option<([f64; 3], f64)>, tension: Option<TensionRe
     words.join(", ")
 }
 
-/// Change of the stress within the cells at its largest value beyond which this value may be anything: half of it. There the next mesh of half the
-/// size has half of the change where the stress is smooth, and the same where it is singular.
+/// Change of the stress within the cells at its largest value beyond which this value may be anything: half of it.
+/// There the next mesh of half the size has half of the change where the stress is smooth, and the same where it is
+/// singular.
 pub const UNSETTLED: f64 = 0.5;
 
 /// Return the line of a body with its reactions and imbalances.
@@ -776,8 +784,8 @@ fn counted(count: usize, what: &str) -> String {
     format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 
-/// Relative error of forces that no run promises to undercut: the tolerance of a run that gives none. A smaller component beside a larger one is the roundoff
-/// of a sum over nodes, and is printed as zero. Files have all digits.
+/// Relative error of forces that no run promises to undercut: the tolerance of a run that gives none. A smaller
+/// component beside a larger one is the roundoff of a sum over nodes, and is printed as zero. Files have all digits.
 pub const DIGITS: f64 = 1e-8;
 
 /// Return a point of the scene for a message.

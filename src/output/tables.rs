@@ -1,5 +1,5 @@
-//! The tables of a run as CSV: `history.csv` and `steps.csv`, which grow row by row while it works, `contacts.csv` with a row for each pair, and
-//! a table of the contact points of each pair.
+//! The tables of a run as CSV: `history.csv` and `steps.csv`, which grow row by row while it works, `contacts.csv` with
+//! a row for each pair, and a table of the contact points of each pair.
 
 use super::field;
 use super::folder::{Folder, failed};
@@ -32,8 +32,8 @@ pub fn vector(what: &str, name: &str, vector: &[f64; 3], dimension: usize) -> im
         .map(move |(axis, &v)| number(format!("{what}_{axis} {name}"), v))
 }
 
-/// A CSV file to which every row is written at once, so that a killed run keeps all that it had computed. The first row brings the header. After a
-/// row that cannot be written, as on a full disk, no more are.
+/// A CSV file to which every row is written at once, so that a killed run keeps all that it had computed. The first row
+/// brings the header. After a row that cannot be written, as on a full disk, no more are.
 pub struct RowFile {
     path: PathBuf,
     csv: csv::Writer<File>,
@@ -221,7 +221,8 @@ pub struct PairRow {
     pub closed: usize,
     /// Initial gap d at the points: least, mean over the area, largest.
     pub gap: [f64; 3],
-    /// Distance of the surfaces after deformation, -c where that is positive: mean over the area of all points, and largest.
+    /// Distance of the surfaces after deformation, -c where that is positive: mean over the area of all points, and
+    /// largest.
     pub opening: [f64; 2],
     /// File of its contact table; empty if it has none.
     pub table: String,

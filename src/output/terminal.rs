@@ -1,6 +1,7 @@
 //! The table of iterations on the terminal, and progress lines.
 //!
-//! The table goes to standard output and progress lines go to standard error, each only if that is a terminal. Piped output stays free of both.
+//! The table goes to standard output and progress lines go to standard error, each only if that is a terminal. Piped
+//! output stays free of both.
 
 use super::{sci, seconds};
 use crate::ddm::{Observer, Row};
@@ -9,7 +10,8 @@ use std::fmt;
 use std::io::{self, IsTerminal, Write};
 use std::time::Duration;
 
-/// An observer that prints one line per iteration: all up to 20, every 10th up to 200, every 100th after that, and the last.
+/// An observer that prints one line per iteration: all up to 20, every 10th up to 200, every 100th after that, and the
+/// last.
 pub struct IterationTable {
     /// Output of the table; none prints no table.
     table: Option<Box<dyn Write>>,
@@ -24,8 +26,8 @@ pub struct IterationTable {
 }
 
 impl IterationTable {
-    /// Return a table on the terminal of this process, or one without output unless `loud`. `target` says in words when the
-    /// iteration stops ("residual < 1e-8"), and `tolerance` is that residual.
+    /// Return a table on the terminal of this process, or one without output unless `loud`. `target` says in words when
+    /// the iteration stops ("residual < 1e-8"), and `tolerance` is that residual.
     pub fn new(loud: bool, target: &str, tolerance: Option<f64>) -> Self {
         let bar = if loud { ProgressBar::new_spinner() } else { ProgressBar::hidden() };
         if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed} {wide_msg}") {
@@ -86,8 +88,8 @@ impl Drop for IterationTable {
     }
 }
 
-/// Return the seconds until the residual reaches `tolerance`, if it falls at the mean rate since the `first` row. The result is
-/// not finite if the residual does not fall.
+/// Return the seconds until the residual reaches `tolerance`, if it falls at the mean rate since the `first` row. The
+/// result is not finite if the residual does not fall.
 fn time_left(row: &Row, first: &Row, tolerance: f64) -> f64 {
     (row.residual / tolerance).ln() / (first.residual / row.residual).ln().max(0.0) * (row.seconds - first.seconds)
 }
@@ -131,16 +133,17 @@ const SHORT: f64 = 1.0;
 pub struct ProgressLine(ProgressBar);
 
 impl ProgressLine {
-    /// Return a line with the name `what` of the phase and the elapsed time, shown after a second. If the duration in seconds
-    /// has an `estimate`, the line shows the remaining time, too.
+    /// Return a line with the name `what` of the phase and the elapsed time, shown after a second. If the duration in
+    /// seconds has an `estimate`, the line shows the remaining time, too.
     pub fn new(what: &str, estimate: Option<f64>) -> Self {
         let what = what.to_owned();
         let text = move |state: &ProgressState, out: &mut dyn fmt::Write| {
             let elapsed = state.elapsed().as_secs_f64();
             // a line that cannot be written is no reason to stop
-            let _ = match elapsed < SHORT {
-                true => Ok(()),
-                false => write!(out, "{what}, {elapsed:.0} s{}", left(estimate.map(|total| total - elapsed))),
+            let _ = if elapsed < SHORT {
+                Ok(())
+            } else {
+                write!(out, "{what}, {elapsed:.0} s{}", left(estimate.map(|total| total - elapsed)))
             };
         };
         let bar = ProgressBar::new_spinner();

@@ -4,7 +4,8 @@ use super::fields::{CellKind, FieldArray, UnstructuredGrid};
 use super::folder::MARK_OF_MESH;
 use std::io::{self, Write};
 
-/// The entities, points and cells of earlier files. Tags go on from there, so that Gmsh can open the files of a run together.
+/// The entities, points and cells of earlier files. Tags go on from there, so that Gmsh can open the files of a run
+/// together.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Tags {
     /// Files before this one.
@@ -16,8 +17,8 @@ pub struct Tags {
 }
 
 impl UnstructuredGrid {
-    /// Write the grid as `.msh`. Its cells are a physical group with the title as name, and each array at its points becomes a
-    /// view `title: name`. Symmetric tensors become full ones. Nodes with a NaN are left out of a view.
+    /// Write the grid as `.msh`. Its cells are a physical group with the title as name, and each array at its points
+    /// becomes a view `title: name`. Symmetric tensors become full ones. Nodes with a NaN are left out of a view.
     pub fn write_msh(&self, tags: Tags, out: &mut dyn Write) -> io::Result<()> {
         let (dimension, _) = self.cell.gmsh();
         let tag = tags.entity as i32 + 1;

@@ -1,4 +1,5 @@
-//! Files for ParaView: `.vtu` with the numbers behind the XML as raw bytes, `.pvtu`, which joins the parts of ranks, and `.pvd`, a collection over time.
+//! Files for ParaView: `.vtu` with the numbers behind the XML as raw bytes, `.pvtu`, which joins the parts of ranks,
+//! and `.pvd`, a collection over time.
 
 use super::escape;
 use super::fields::{BodyField, FieldArray, UnstructuredGrid};
@@ -8,7 +9,8 @@ use std::io::{self, Write};
 /// A function that writes to a file.
 type Writing<'a> = dyn Fn(&mut dyn Write) -> io::Result<()> + 'a;
 
-/// The numbers of an array as they stand in a file: the name of their type, the number of their bytes, and how they are written.
+/// The numbers of an array as they stand in a file: the name of their type, the number of their bytes, and how they are
+/// written.
 struct Block<'a> {
     kind: &'static str,
     bytes: usize,
@@ -23,9 +25,10 @@ fn block<'a, const N: usize>(kind: &'static str, count: usize, number: impl Fn(u
 
 /// Return a block of real numbers, with four bytes a number if `single`.
 fn reals(values: &[f64], single: bool) -> Block<'_> {
-    match single {
-        true => block("Float32", values.len(), move |k| (values[k] as f32).to_le_bytes()),
-        false => block("Float64", values.len(), move |k| values[k].to_le_bytes()),
+    if single {
+        block("Float32", values.len(), move |k| (values[k] as f32).to_le_bytes())
+    } else {
+        block("Float64", values.len(), move |k| values[k].to_le_bytes())
     }
 }
 
@@ -57,7 +60,8 @@ impl<'a> Document<'a> {
 }
 
 impl UnstructuredGrid {
-    /// Write the grid for ParaView, with four bytes a number if `single` and eight otherwise. Arrays must fit the points and cells.
+    /// Write the grid for ParaView, with four bytes a number if `single` and eight otherwise. Arrays must fit the
+    /// points and cells.
     pub fn write(&self, single: bool, out: &mut dyn Write) -> io::Result<()> {
         let (stride, cells) = (self.cell.stride(), self.connectivity.len() / self.cell.stride());
         let points = self.points.len();

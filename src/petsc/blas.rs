@@ -1,7 +1,7 @@
 //! The BLAS and LAPACK that MUMPS and PETSc use: dense Cholesky factorisations, the name, and the number of threads.
 //!
-//! Factorisations with the reference BLAS are up to 11 times slower, so a run reports the name. Only OpenBLAS has functions with `openblas_`, which are
-//! looked up by name.
+//! Factorisations with the reference BLAS are up to 11 times slower, so a run reports the name. Only OpenBLAS has
+//! functions with `openblas_`, which are looked up by name.
 
 use super::ffi::{dpotrf_, dpotrs_};
 use crate::error::{Error, Kind, Result};
@@ -18,7 +18,8 @@ fn order(matrix: &[f64], n: usize) -> Result<c_int> {
     }
 }
 
-/// Factor a dense symmetric matrix of `n` rows in place by Cholesky's method (LAPACK's dpotrf), and return whether it is positive definite.
+/// Factor a dense symmetric matrix of `n` rows in place by Cholesky's method (LAPACK's dpotrf), and return whether it
+/// is positive definite.
 ///
 /// The other triangle is not changed.
 ///

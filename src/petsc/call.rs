@@ -1,10 +1,11 @@
 //! How functions of PETSc are called, and what their errors become.
 //!
-//! PETSc reports an error frame by frame, innermost first, to a handler. The handler of this module records the frames and prints nothing.
-//! [`check_code`] reads them when the code has come back to Rust.
+//! PETSc reports an error frame by frame, innermost first, to a handler. The handler of this module records the frames
+//! and prints nothing. [`check_code`] reads them when the code has come back to Rust.
 //!
-//! Each library has integers of its own width. PETSc has [`Int`](super::Int), 32 or 64 bits as it was configured. MUMPS has
-//! [`MumpsInt`](super::ffi::MumpsInt) and METIS [`idx_t`](super::ffi::idx_t). Patterns of this program have 32 bits.
+//! Each library has integers of its own width. PETSc has [`Int`](super::Int), 32 or 64 bits as it was configured. MUMPS
+//! has [`MumpsInt`](super::ffi::MumpsInt) and METIS [`idx_t`](super::ffi::idx_t). Patterns of this program have 32
+//! bits.
 
 use super::ffi;
 use super::ffi::PetscBool;
@@ -14,8 +15,9 @@ use std::cell::{Cell, RefCell};
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::ptr::{null, null_mut};
 
-/// Options that the program gives PETSc at its start: signals are left to Rust, so that a panic or a stack overflow prints its own message, and
-/// no files of options are looked for. They can run programs, and the current folder may belong to anybody.
+/// Options that the program gives PETSc at its start: signals are left to Rust, so that a panic or a stack overflow
+/// prints its own message, and no files of options are looked for. They can run programs, and the current folder may
+/// belong to anybody.
 const OWN: [&str; 2] = ["-no_signal_handler", "-skip_petscrc"];
 
 thread_local! {
@@ -28,7 +30,8 @@ pub(super) fn runs() -> bool {
     RUNS.get()
 }
 
-/// Call one function of PETSc, which is started if necessary, and check its return code: `unsafe { petsc!(MatMult(a, x, y)) }?`.
+/// Call one function of PETSc, which is started if necessary, and check its return code: `unsafe { petsc!(MatMult(a, x,
+/// y)) }?`.
 ///
 /// Each call stands in an `unsafe` block with its reason. The following holds for every call and is not repeated there:
 /// - A wrapper creates its object of PETSc and destroys it once, in `Drop`.
@@ -54,7 +57,8 @@ pub(super) fn ensure_running() -> Result<()> {
     if runs() { Ok(()) } else { start(&[]) }
 }
 
-/// Start PETSc with the options in `words`, in the environment, and in files that these name. It starts MPI if that does not run.
+/// Start PETSc with the options in `words`, in the environment, and in files that these name. It starts MPI if that
+/// does not run.
 pub(super) fn start(words: &[String]) -> Result<()> {
     // PETSc keeps a pointer to these words until its end, so they are leaked, once
     let mut arguments = Vec::with_capacity(words.len() + OWN.len() + 2);
@@ -65,9 +69,8 @@ pub(super) fn start(words: &[String]) -> Result<()> {
     arguments.push(null_mut());
     let mut arguments: *mut *mut c_char = Vec::leak(arguments).as_mut_ptr();
     let (count, arguments) = (&raw mut count, &raw mut arguments);
-    // The handler is pushed first, so that errors of the start are recorded, too. Handlers of the user (-on_error_abort,
-    // -start_in_debugger) come on top of it.
-    // SAFETY: the handler has PETSc's own type.
+    // The handler is pushed first, so that errors of the start are recorded, too. Handlers of the user
+    // (-on_error_abort, -start_in_debugger) come on top of it. SAFETY: the handler has PETSc's own type.
     check_code("PetscPushErrorHandler", || unsafe { ffi::PetscPushErrorHandler(Some(record), null_mut()) })?;
     // SAFETY: words and count live until the end of the process.
     let initialize = || unsafe { ffi::PetscInitialize(count, arguments, null(), null()) };

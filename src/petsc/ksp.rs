@@ -1,5 +1,5 @@
-//! Linear solvers (KSP with a preconditioner PC): their options, solves, subspaces around the preconditioner, why a solve stopped, and how a
-//! solver recovers from a factorisation that failed.
+//! Linear solvers (KSP with a preconditioner PC): their options, solves, subspaces around the preconditioner, why a
+//! solve stopped, and how a solver recovers from a factorisation that failed.
 
 use super::call::{flag, is_set, petsc, string, text, text_from};
 use super::mumps::EXTRA_SPACE;
@@ -19,7 +19,8 @@ pub struct Solved {
     pub iterations: usize,
     /// Why the solver stopped.
     pub reason: ConvergedReason,
-    /// The norm of the last residual as the solver measures it (its `-ksp_norm_type`); 0 for a solver without a norm, such as `preonly`.
+    /// The norm of the last residual as the solver measures it (its `-ksp_norm_type`); 0 for a solver without a norm,
+    /// such as `preonly`.
     pub residual: f64,
 }
 
@@ -139,8 +140,8 @@ impl Ksp {
         Ok(())
     }
 
-    /// Read the options of the solver. `preonly` never keeps a preconditioner of an older matrix, whatever is typed: its answer would be
-    /// wrong.
+    /// Read the options of the solver. `preonly` never keeps a preconditioner of an older matrix, whatever is typed:
+    /// its answer would be wrong.
     ///
     /// # Errors
     /// When PETSc refuses an option, and for `-ksp_max_it 0`.
@@ -185,7 +186,8 @@ impl Ksp {
         asked.is_ok() && is_set(reuse)
     }
 
-    /// Set up the preconditioner or factorisation of the current matrix, if that has not been done. Every solve does so, too.
+    /// Set up the preconditioner or factorisation of the current matrix, if that has not been done. Every solve does
+    /// so, too.
     ///
     /// [`failure`](Self::failure) and the next solve report a factorisation that failed.
     ///
@@ -298,13 +300,15 @@ impl Ksp {
         unsafe { text_from(|name| petsc!(KSPGetType(self.ksp, name))) }.unwrap_or_default()
     }
 
-    /// Return the type of the preconditioner, such as `gamg`. It is empty until options were read or the solver was set up.
+    /// Return the type of the preconditioner, such as `gamg`. It is empty until options were read or the solver was set
+    /// up.
     pub fn pc_type(&self) -> String {
         // SAFETY: as above.
         unsafe { text_from(|name| self.pc().and_then(|pc| petsc!(PCGetType(pc, name)))) }.unwrap_or_default()
     }
 
-    /// Return the package that factors, such as `mumps`. It is `None` before the set-up and for preconditioners that do not factor.
+    /// Return the package that factors, such as `mumps`. It is `None` before the set-up and for preconditioners that do
+    /// not factor.
     pub fn factor_package(&self) -> Option<String> {
         // SAFETY: as above.
         unsafe { text_from(|name| self.pc().and_then(|pc| petsc!(PCFactorGetMatSolverType(pc, name)))) }
@@ -337,9 +341,11 @@ impl Ksp {
 }
 
 impl Ksp {
-    /// Put an exact solve in a subspace around the preconditioner of this solver, and around subspaces that were added before.
+    /// Put an exact solve in a subspace around the preconditioner of this solver, and around subspaces that were added
+    /// before.
     ///
-    /// `matrix` is the matrix of this solver, and `name` is what `-ksp_view` shows. Collective. New values of the matrix need a new subspace.
+    /// `matrix` is the matrix of this solver, and `name` is what `-ksp_view` shows. Collective. New values of the
+    /// matrix need a new subspace.
     ///
     /// ```
     /// use std::{cell::Cell, rc::Rc};
@@ -392,8 +398,9 @@ impl Ksp {
 
     /// Solve exactly in the outermost subspace before the iteration: set `x` to Q b and replace `rest` = b by b - A x.
     ///
-    /// All residuals of conjugate gradients from there have Q r = 0 up to rounding. So an application needs no solve before M, which saves half of the work in
-    /// the space, until the returned guard is dropped. Return `None` without a subspace, or for another method than `cg`.
+    /// All residuals of conjugate gradients from there have Q r = 0 up to rounding. So an application needs no solve
+    /// before M, which saves half of the work in the space, until the returned guard is dropped. Return `None` without
+    /// a subspace, or for another method than `cg`.
     pub(super) fn start(&self, rest: &mut Vec<f64>, x: &mut [f64]) -> Result<Option<Started<'_>>> {
         let Some(outermost) = self.wrappers.last().filter(|_| self.ksp_type() == "cg") else { return Ok(None) };
         outermost.start(rest, x).map(Some)

@@ -3,13 +3,14 @@
 use std::env;
 use std::process::Command;
 
-/// Return whether a launcher such as `mpiexec` or `srun` started this process, by the variables of Open MPI, PMIx and PMI.
+/// Return whether a launcher such as `mpiexec` or `srun` started this process, by the variables of Open MPI, PMIx and
+/// PMI.
 pub(super) fn is_launched() -> bool {
     ["OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK"].iter().any(|name| env::var_os(name).is_some())
 }
 
-/// The settings of Open MPI for a process without a launcher. Start and end of PETSc take 0.06 s with all of them, and 0.5 s with none (medians of
-/// twelve on two cores).
+/// The settings of Open MPI for a process without a launcher. Start and end of PETSc take 0.06 s with all of them, and
+/// 0.5 s with none (medians of twelve on two cores).
 const ALONE: [(&str, &str); 4] = [
     // no daemon: 0.15 s (Open MPI 4; version 5 has none)
     ("OMPI_MCA_ess_singleton_isolated", "1"),
@@ -23,14 +24,15 @@ const ALONE: [(&str, &str); 4] = [
 
 /// Run `start` with the settings of a process without a launcher, unless the user set one of them.
 ///
-/// They are environment variables, which hold only while MPI starts: a child process under `mpiexec` would inherit them and break.
+/// They are environment variables, which hold only while MPI starts: a child process under `mpiexec` would inherit them
+/// and break.
 pub(super) fn with_quick_start<T>(start: impl FnOnce() -> T) -> T {
     if is_launched() || ALONE.iter().any(|(name, _)| env::var_os(name).is_some()) {
         return start();
     }
     for (name, value) in ALONE {
-        // SAFETY: Rust's own readers and writers of the environment share a lock. The thread that runs the program starts the session, before
-        // the libraries below have threads that might read the environment.
+        // SAFETY: Rust's own readers and writers of the environment share a lock. The thread that runs the program
+        // starts the session, before the libraries below have threads that might read the environment.
         unsafe { env::set_var(name, value) };
     }
     let result = start();
@@ -41,8 +43,9 @@ pub(super) fn with_quick_start<T>(start: impl FnOnce() -> T) -> T {
     result
 }
 
-/// Return the command that starts ranks of a program: the words of `$WINKLER_MPIEXEC`, or else `mpiexec`. Arguments to add are `-n`, the
-/// number of ranks, and the program. Open MPI gets the permission to start more ranks than there are cores.
+/// Return the command that starts ranks of a program: the words of `$WINKLER_MPIEXEC`, or else `mpiexec`. Arguments to
+/// add are `-n`, the number of ranks, and the program. Open MPI gets the permission to start more ranks than there are
+/// cores.
 pub fn launcher() -> Command {
     let typed = env::var("WINKLER_MPIEXEC").unwrap_or_default();
     let mut words = typed.split_whitespace();

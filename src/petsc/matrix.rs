@@ -57,7 +57,8 @@ impl Matrix {
         Self::new(session, block_size, Rows::all(row_ptr, columns, values)?)
     }
 
-    /// Create a matrix from rows, without copies. `block_size` dofs belong to one node (1 if unsure). Collective for distributed rows.
+    /// Create a matrix from rows, without copies. `block_size` dofs belong to one node (1 if unsure). Collective for
+    /// distributed rows.
     ///
     /// # Errors
     /// When the block size does not divide the number of rows.
@@ -125,12 +126,13 @@ impl Matrix {
 
     /// Return the stored values, in the order of [`Rows`].
     pub fn values(&self) -> &[f64] {
-        // SAFETY: PETSc keeps the array while `self.mat` lives. Its solvers write to it with -ksp_diagonal_scale alone, and have restored it when
-        // their call returns.
+        // SAFETY: PETSc keeps the array while `self.mat` lives. Its solvers write to it with -ksp_diagonal_scale alone,
+        // and have restored it when their call returns.
         unsafe { std::slice::from_raw_parts(self.values, self.nonzeros) }
     }
 
-    /// Change values in place and return what `change` returns. The pattern stays, and solvers factor again at their next use.
+    /// Change values in place and return what `change` returns. The pattern stays, and solvers factor again at their
+    /// next use.
     pub fn update<T>(&mut self, change: impl FnOnce(&mut [f64]) -> T) -> Result<T> {
         // SAFETY: PETSc uses the array in its own calls only, and `&mut self` excludes the slice of `values`.
         let result = change(unsafe { std::slice::from_raw_parts_mut(self.values, self.nonzeros) });
@@ -150,7 +152,8 @@ impl Matrix {
         };
         for part in parts.into_iter().filter(|part| !part.is_null()) {
             let mut values = null_mut();
-            // SAFETY: nothing is written between the calls, which raise the state of the matrix and invalidate its inverted diagonal.
+            // SAFETY: nothing is written between the calls, which raise the state of the matrix and invalidate its
+            // inverted diagonal.
             unsafe {
                 petsc!(MatSeqAIJGetArray(part, &mut values))?;
                 petsc!(MatSeqAIJRestoreArray(part, &mut values))?;
@@ -175,7 +178,8 @@ impl Matrix {
 
     /// Give multigrid the modes that the matrix nearly annihilates: for elasticity, the rigid motions.
     ///
-    /// Each mode has one entry for each row of this process. Modes need not be orthonormal; dependent ones are left out.
+    /// Each mode has one entry for each row of this process. Modes need not be orthonormal; dependent ones are left
+    /// out.
     ///
     /// # Errors
     /// When a mode does not have one entry for each row.
@@ -264,11 +268,13 @@ unsafe fn create(comm: MPI_Comm, rows: *mut Rows) -> Result<(ffi::Mat, *mut f64)
     let (i, j) = (rows.row_ptr.as_mut_ptr(), rows.columns.as_mut_ptr());
     let mut mat = null_mut();
     match rows.scope {
-        // SAFETY: `Rows` has checked that the arrays fit each other; they live as long as PETSc's matrix, by the caller's promise.
+        // SAFETY: `Rows` has checked that the arrays fit each other; they live as long as PETSc's matrix, by the
+        // caller's promise.
         Scope::Process => unsafe { petsc!(MatCreateSeqAIJWithArrays(comm, n, n, i, j, values, &mut mat)) },
         Scope::World => {
             let (other_i, other_j) = (rows.other_row_ptr.as_mut_ptr(), rows.other_columns.as_mut_ptr());
-            // SAFETY: as above. `values` first has one value for each entry of `columns`, and then those of the other columns.
+            // SAFETY: as above. `values` first has one value for each entry of `columns`, and then those of the other
+            // columns.
             unsafe {
                 let other_values = values.add(rows.columns.len());
                 petsc!(MatCreateMPIAIJWithSplitArrays(
@@ -291,8 +297,8 @@ unsafe fn create(comm: MPI_Comm, rows: *mut Rows) -> Result<(ffi::Mat, *mut f64)
     Ok((mat, values))
 }
 
-/// Return an orthonormal basis of the span of the vectors. Vectors that depend on others to rounding are left out. `sum` sums over
-/// processes.
+/// Return an orthonormal basis of the span of the vectors. Vectors that depend on others to rounding are left out.
+/// `sum` sums over processes.
 fn orthonormal(vectors: &[Vec<f64>], sum: &dyn Fn(&mut [f64])) -> Vec<Vec<f64>> {
     let dot = |a: &[f64], b: &[f64]| -> f64 {
         let mut product = [a.iter().zip(b).map(|(a, b)| a * b).sum()];
@@ -321,10 +327,11 @@ fn orthonormal(vectors: &[Vec<f64>], sum: &dyn Fn(&mut [f64])) -> Vec<Vec<f64>> 
 
 /// The rows of a square matrix: all, or those of one of several processes.
 ///
-/// They live exactly as long as PETSc's matrix, which may outlive [`Matrix`](super::Matrix) inside a solver. PETSc calls `free` at the end.
+/// They live exactly as long as PETSc's matrix, which may outlive [`Matrix`](super::Matrix) inside a solver. PETSc
+/// calls `free` at the end.
 ///
-/// A column is an own column if this process has the row of the same number. All values in own columns come first, row by row. All other
-/// values follow, row by row.
+/// A column is an own column if this process has the row of the same number. All values in own columns come first, row
+/// by row. All other values follow, row by row.
 ///
 /// ```
 /// use winkler::petsc::Rows;
@@ -352,7 +359,8 @@ pub struct Rows {
 impl Rows {
     /// Take all rows of a matrix.
     ///
-    /// Row `i` has the columns `columns[row_ptr[i]..row_ptr[i + 1]]`, in increasing order, and the values at the same positions.
+    /// Row `i` has the columns `columns[row_ptr[i]..row_ptr[i + 1]]`, in increasing order, and the values at the same
+    /// positions.
     ///
     /// # Errors
     /// When the arrays do not describe a square matrix with sorted columns.
@@ -363,7 +371,8 @@ impl Rows {
         Ok(Rows { scope: Scope::Process, first: 0, total, row_ptr, columns, other_row_ptr, other_columns, values })
     }
 
-    /// Take the rows of this process, from the global number `first` on among `total`, with global columns. No second copy is made.
+    /// Take the rows of this process, from the global number `first` on among `total`, with global columns. No second
+    /// copy is made.
     ///
     /// Rows are numbered in the order of the processes, any of which may have none.
     ///
@@ -427,9 +436,10 @@ impl Rows {
             let (from, to) = (row_ptr[i] as usize, row_ptr[i + 1] as usize);
             columns[from..to].binary_search(&(j as Int)).ok().map(|at| from + at)
         };
-        match self.own().contains(&j) {
-            true => find(&self.row_ptr, &self.columns, j - self.first),
-            false => find(&self.other_row_ptr, &self.other_columns, j).map(|at| self.columns.len() + at),
+        if self.own().contains(&j) {
+            find(&self.row_ptr, &self.columns, j - self.first)
+        } else {
+            find(&self.other_row_ptr, &self.other_columns, j).map(|at| self.columns.len() + at)
         }
     }
 }
@@ -450,8 +460,8 @@ pub(super) unsafe extern "C" fn free(rows: *mut c_void) -> ffi::PetscErrorCode {
 /// The matrix is one of PETSc's; the rows are from a box that nobody else frees.
 unsafe fn attach(mat: ffi::Mat, rows: *mut Rows) -> Result<()> {
     let mut container = null_mut();
-    // SAFETY: the communicator is the constant of MPI itself; the matrix takes a reference to the container; the destructor fits the
-    // pointer by the caller's promise.
+    // SAFETY: the communicator is the constant of MPI itself; the matrix takes a reference to the container; the
+    // destructor fits the pointer by the caller's promise.
     unsafe {
         petsc!(PetscContainerCreate(RSMPI_COMM_SELF, &mut container))?;
         petsc!(PetscContainerSetPointer(container, rows.cast()))?;

@@ -1,8 +1,9 @@
 //! A safe binding of the part of PETSc that solves linear systems, useful alone.
 //!
-//! Objects hold a counted token of the [`Session`] and have no lifetimes. PETSc ends with the last token. Objects are neither `Send` nor
-//! `Sync`. Every call is checked, and PETSc's own message is in the [`Error`](crate::error::Error). PETSc itself prints only what options
-//! request (`-ksp_monitor`, `-ksp_view`, `-log_view`, `-help`, ...). Where a function says nothing else, its errors are PETSc's and those of MUMPS.
+//! Objects hold a counted token of the [`Session`] and have no lifetimes. PETSc ends with the last token. Objects are
+//! neither `Send` nor `Sync`. Every call is checked, and PETSc's own message is in the [`Error`](crate::error::Error).
+//! PETSc itself prints only what options request (`-ksp_monitor`, `-ksp_view`, `-log_view`, `-help`, ...). Where a
+//! function says nothing else, its errors are PETSc's and those of MUMPS.
 //!
 //! ```
 //! use winkler::petsc::{Ksp, Matrix, Session};

@@ -13,15 +13,16 @@ use std::ptr::null_mut;
 /// Space beyond the estimate of the analysis, in per cent; the values are tried one after the other.
 pub(super) const EXTRA_SPACE: [i32; 4] = [20, 60, 200, 1000];
 
-/// Values of ICNTL(7): the elimination order by MUMPS' approximate minimum degree, and a given one. With a Schur complement MUMPS replaces PORD by
-/// minimum degree. `groove3d` with n = 40 (237 636 dofs) takes 1226 MB with it, and 1032 MB with METIS.
+/// Values of ICNTL(7): the elimination order by MUMPS' approximate minimum degree, and a given one. With a Schur
+/// complement MUMPS replaces PORD by minimum degree. `groove3d` with n = 40 (237 636 dofs) takes 1226 MB with it, and
+/// 1032 MB with METIS.
 const MINIMUM_DEGREE: MumpsInt = 0;
 const GIVEN: MumpsInt = 1;
 
 /// Largest number of dofs of a plane body that is ordered by minimum degree.
 ///
-/// Up to this size nested dissection takes a third to half of the time of everything else, and saves at most 8 % of the fill. It saves 18 %
-/// at 50 000 dofs, and in space a quarter at 12 000.
+/// Up to this size nested dissection takes a third to half of the time of everything else, and saves at most 8 % of the
+/// fill. It saves 18 % at 50 000 dofs, and in space a quarter at 12 000.
 const SMALL: usize = 20_000;
 
 /// Controls ICNTL that this module sets itself.
@@ -38,8 +39,9 @@ const RESERVED: [(usize, &str); 8] = [
 
 /// A sparse symmetric positive definite matrix K whose interior dofs are eliminated.
 ///
-/// R are the interface dofs and I the interior dofs, which are all others. The Schur complement is S = K_RR - K_RI K_II^-1 K_IR. One symbolic
-/// and one numeric factorisation of K_II give S, condensed right-hand sides, and the solution in the interior.
+/// R are the interface dofs and I the interior dofs, which are all others. The Schur complement is S = K_RR - K_RI
+/// K_II^-1 K_IR. One symbolic and one numeric factorisation of K_II give S, condensed right-hand sides, and the
+/// solution in the interior.
 ///
 /// ```
 /// use winkler::petsc::{Schur, Session};
@@ -72,14 +74,15 @@ pub struct Schur {
 impl Schur {
     /// Analyse the elimination of all dofs but the `interface` ones, which may be none.
     ///
-    /// `lower` holds (row, column, value) of the lower triangle, row by row, each entry once. `block_size` dofs belong to one node. The `controls`
-    /// are options `mat_mumps_icntl_<i>` and `mat_mumps_cntl_<i>` with their values.
+    /// `lower` holds (row, column, value) of the lower triangle, row by row, each entry once. `block_size` dofs belong
+    /// to one node. The `controls` are options `mat_mumps_icntl_<i>` and `mat_mumps_cntl_<i>` with their values.
     ///
-    /// The order of elimination is nested dissection by METIS (ICNTL(7) = 1). Small plane bodies take MUMPS' own approximate minimum degree
-    /// (0).
+    /// The order of elimination is nested dissection by METIS (ICNTL(7) = 1). Small plane bodies take MUMPS' own
+    /// approximate minimum degree (0).
     ///
-    /// MUMPS treats pivots below an absolute size (about 1e-20) as zeros, and does not scale a matrix with a Schur complement. It gets D K D
-    /// with powers of two D, which round nothing. What counts as small then depends neither on units nor on other regions.
+    /// MUMPS treats pivots below an absolute size (about 1e-20) as zeros, and does not scale a matrix with a Schur
+    /// complement. It gets D K D with powers of two D, which round nothing. What counts as small then depends neither
+    /// on units nor on other regions.
     ///
     /// # Errors
     /// When a control cannot be used, or MUMPS refuses the pattern.
@@ -202,7 +205,8 @@ impl Schur {
         self.expand_condensed(b, x_interface)
     }
 
-    /// Return the same x for the right-hand side of the last [`condense`](Self::condense), whose intermediate result MUMPS has kept.
+    /// Return the same x for the right-hand side of the last [`condense`](Self::condense), whose intermediate result
+    /// MUMPS has kept.
     pub fn expand_condensed(&mut self, b: &[f64], x_interface: &[f64]) -> Result<Vec<f64>> {
         let mut x = self.scaled(b);
         let mut reduced: Vec<f64> =
@@ -220,7 +224,8 @@ impl Schur {
         b.iter().zip(&self.scale).map(|(b, scale)| b * scale).collect()
     }
 
-    /// Do one phase of the solution (ICNTL(26)): phase 1 condenses `b` into `reduced`, phase 2 expands `reduced` into `b`.
+    /// Do one phase of the solution (ICNTL(26)): phase 1 condenses `b` into `reduced`, phase 2 expands `reduced` into
+    /// `b`.
     fn solve(&mut self, phase: MumpsInt, b: &mut [f64], reduced: &mut [f64]) -> Result<()> {
         let mumps = &mut *self.mumps;
         if b.len() != mumps.n as usize || reduced.len() != self.interface.len() {
@@ -297,7 +302,8 @@ fn scales(rows: usize, lower: &[(usize, usize, f64)]) -> Vec<f64> {
     scale
 }
 
-/// Return the position of each dof in the order of elimination, from 1: nested dissection of the nodes, then the interface dofs in their order.
+/// Return the position of each dof in the order of elimination, from 1: nested dissection of the nodes, then the
+/// interface dofs in their order.
 fn positions(
     block_size: usize,
     rows: usize,

@@ -38,8 +38,8 @@ impl Session {
 }
 
 impl Options {
-    /// Return the options of solvers that the user gave: those that PETSc did not read itself at its start, and what was [`set`](Self::set) since,
-    /// sorted by name.
+    /// Return the options of solvers that the user gave: those that PETSc did not read itself at its start, and what
+    /// was [`set`](Self::set) since, sorted by name.
     pub fn typed(&self) -> Vec<Entry> {
         self.session.typed().borrow().clone().into_iter().collect()
     }
@@ -47,7 +47,8 @@ impl Options {
     /// Set an option, or replace its value, as if the user had typed it.
     ///
     /// # Errors
-    /// When the name does not begin with a letter after its dash or has a blank, a text has a zero byte, or the table is full.
+    /// When the name does not begin with a letter after its dash or has a blank, a text has a zero byte, or the table
+    /// is full.
     pub fn set(&self, name: &str, value: Option<&str>) -> Result<()> {
         self.put(name, value)?;
         self.session.typed().borrow_mut().insert(dashed(name), value.map(str::to_owned));
@@ -140,7 +141,8 @@ const GLOBAL: [&str; 14] = [
     "citations",
 ];
 
-/// Return whether a word names a family of objects of a solver; such words stand alone or between two `_` (`-sub_ksp_type`).
+/// Return whether a word names a family of objects of a solver; such words stand alone or between two `_`
+/// (`-sub_ksp_type`).
 pub fn is_family(word: &str) -> bool {
     FAMILIES.contains(&word)
 }

@@ -1,12 +1,14 @@
 //! A local correction: an exact solve on a few dofs before and after the preconditioner of a solver.
 //!
-//! A preconditioner M may belong to a matrix that differs from A on some dofs P. A symmetric multiplicative Schwarz step makes it one of A:
+//! A preconditioner M may belong to a matrix that differs from A on some dofs P. A symmetric multiplicative Schwarz
+//! step makes it one of A:
 //!
 //! ```text
 //! y = S r_P,   z = P y + M (r - A P y),   z += P S (r - A z)_P       S = (P'AP)^-1
 //! ```
 //!
-//! r is the residual and z the result. The last product needs the columns P of A only; each process has its rows of these columns.
+//! r is the residual and z the result. The last product needs the columns P of A only; each process has its rows of
+//! these columns.
 
 use super::call::{flag, petsc};
 use super::matrix::Indices;
@@ -34,8 +36,9 @@ struct PatchSpace {
 impl Ksp {
     /// Add a local correction to the preconditioner of this solver, which stays that of an older matrix.
     ///
-    /// The correction solves exactly on the `dofs` of the `matrix` of this solver and on those within `layers` of its graph around them.
-    /// `dofs` are global indices, the same on all processes. Collective. New values of the matrix need a new correction.
+    /// The correction solves exactly on the `dofs` of the `matrix` of this solver and on those within `layers` of its
+    /// graph around them. `dofs` are global indices, the same on all processes. Collective. New values of the matrix
+    /// need a new correction.
     ///
     /// Return false, and add nothing, if P'AP is not positive definite to rounding.
     ///

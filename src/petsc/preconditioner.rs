@@ -12,11 +12,11 @@ use std::ptr::null_mut;
 impl Ksp {
     /// Choose multigrid of two levels (PCMG) as preconditioner. To be called before the options are read.
     ///
-    /// P interpolates from the coarse level, P' restricts, and the matrix of the coarse level is P'AP. It is computed anew when the
-    /// `matrix` A of this solver changes.
+    /// P interpolates from the coarse level, P' restricts, and the matrix of the coarse level is P'AP. It is computed
+    /// anew when the `matrix` A of this solver changes.
     ///
-    /// P has one row for each row of A on this process. Row `i` has the global columns `columns[row_ptr[i]..row_ptr[i + 1]]`, in
-    /// increasing order, and the values at the same positions. This process owns `own` columns.
+    /// P has one row for each row of A on this process. Row `i` has the global columns `columns[row_ptr[i]..row_ptr[i +
+    /// 1]]`, in increasing order, and the values at the same positions. This process owns `own` columns.
     ///
     /// ```
     /// use winkler::petsc::{Ksp, Matrix, Session};

@@ -22,8 +22,8 @@ static STARTED: AtomicBool = AtomicBool::new(false);
 
 /// A reference-counted token: PETSc and MPI run as long as one of its clones lives.
 ///
-/// Every object of PETSc holds one, so that objects need no lifetimes and cannot outlive PETSc. It is neither `Send` nor `Sync`, since PETSc
-/// and MUMPS belong to the thread that started them.
+/// Every object of PETSc holds one, so that objects need no lifetimes and cannot outlive PETSc. It is neither `Send`
+/// nor `Sync`, since PETSc and MUMPS belong to the thread that started them.
 ///
 /// ```
 /// use winkler::petsc::Session;
@@ -51,12 +51,13 @@ struct Running {
 impl Session {
     /// Start MPI and PETSc.
     ///
-    /// PETSc gets the options in `words` (as typed: `-ksp_type`, `cg`), in `PETSC_OPTIONS`, and in the file of `-options_file`; it looks for no
-    /// files itself. PETSc installs no signal handlers. With several ranks a panic on one of them ends all.
+    /// PETSc gets the options in `words` (as typed: `-ksp_type`, `cg`), in `PETSC_OPTIONS`, and in the file of
+    /// `-options_file`; it looks for no files itself. PETSc installs no signal handlers. With several ranks a panic on
+    /// one of them ends all.
     ///
     /// # Errors
-    /// `Kind::Solver` when a session was started before in this process, when MPI runs already, or when PETSc refuses an option; PETSc's
-    /// message is among the causes. `Kind::File` when `-options_file` names no regular file.
+    /// `Kind::Solver` when a session was started before in this process, when MPI runs already, or when PETSc refuses
+    /// an option; PETSc's message is among the causes. `Kind::File` when `-options_file` names no regular file.
     pub fn start(words: &[String]) -> Result<Session> {
         refuse_odd_files(words)?;
         start_once()?;
@@ -77,7 +78,8 @@ impl Session {
         Ok(session)
     }
 
-    /// Return a session of this process alone and without options, which starts PETSc and MPI when something needs them.
+    /// Return a session of this process alone and without options, which starts PETSc and MPI when something needs
+    /// them.
     ///
     /// ```
     /// use winkler::petsc::{Ksp, Session};
@@ -115,7 +117,8 @@ impl Session {
         if Rc::strong_count(&self.0) == 1 { call::end() } else { Ok(()) }
     }
 
-    /// Set the number of threads of OpenBLAS in this process, unless the user set OPENBLAS_NUM_THREADS or OMP_NUM_THREADS.
+    /// Set the number of threads of OpenBLAS in this process, unless the user set OPENBLAS_NUM_THREADS or
+    /// OMP_NUM_THREADS.
     ///
     /// Return whether the number is in force.
     pub fn set_blas_threads(&self, count: usize) -> bool {
@@ -152,12 +155,14 @@ impl Session {
         format!("{major}.{minor}.{patch}")
     }
 
-    /// Return the name of the BLAS in use: `OpenBLAS` with its kernels, as in `OpenBLAS (Haswell)`, `reference BLAS`, or the file of another one.
+    /// Return the name of the BLAS in use: `OpenBLAS` with its kernels, as in `OpenBLAS (Haswell)`, `reference BLAS`,
+    /// or the file of another one.
     pub fn blas_name(&self) -> String {
         blas::name()
     }
 
-    /// End all ranks at once with an exit code and without destructors, after a failure that other ranks cannot know of.
+    /// End all ranks at once with an exit code and without destructors, after a failure that other ranks cannot know
+    /// of.
     ///
     /// This is `MPI_Abort`, except that a process without a launcher just exits, without MPI's banner.
     ///
@@ -183,7 +188,8 @@ pub type Entry = (String, Option<String>);
 /// Return the options of the running PETSc that nobody has read so far, sorted by name.
 pub(super) fn left() -> Result<Vec<Entry>> {
     let (mut count, mut names, mut values) = (0, null_mut(), null_mut());
-    // SAFETY: PETSc returns `count` names and as many values; a value may be null. They are copied before PETSc takes its two lists back.
+    // SAFETY: PETSc returns `count` names and as many values; a value may be null. They are copied before PETSc takes
+    // its two lists back.
     let mut entries: Vec<Entry> = unsafe {
         petsc!(PetscOptionsLeftGet(null_mut(), &mut count, &mut names, &mut values))?;
         let entry = |i: usize| {

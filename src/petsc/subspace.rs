@@ -1,4 +1,5 @@
-//! A preconditioner in Rust around one of PETSc (PCSHELL): an exact solve in a subspace before and after the preconditioner of a solver.
+//! A preconditioner in Rust around one of PETSc (PCSHELL): an exact solve in a subspace before and after the
+//! preconditioner of a solver.
 
 use super::call::petsc;
 use super::vector::{Vector, slice, slice_mut};
@@ -16,7 +17,8 @@ use std::ptr::{null, null_mut};
 /// z = Q r + (I - Q A) M (I - A Q) r
 /// ```
 ///
-/// which is a multiplicative Schwarz step before and after M. Slices have one entry for each row of this process. Calls are collective.
+/// which is a multiplicative Schwarz step before and after M. Slices have one entry for each row of this process. Calls
+/// are collective.
 pub trait Subspace {
     /// Add Q (r - A z) to z.
     fn correct(&self, r: &[f64], z: &mut [f64]) -> Result<()>;
@@ -69,9 +71,9 @@ struct CallbackData {
 }
 
 impl CallbackData {
-    /// Compute z from r. If Q r = 0 up to rounding, then z is Q r + (I - Q A) M r (Tang, Nabben, Vuik, Erlangga, J. Sci. Comput. 39, 2009, "A-DEF2").
-    /// The term Q r takes what rounding leaves of residuals in the space out again. Without it, conjugate gradients do not reduce that part, and
-    /// r'z becomes negative when little else is left of r.
+    /// Compute z from r. If Q r = 0 up to rounding, then z is Q r + (I - Q A) M r (Tang, Nabben, Vuik, Erlangga, J.
+    /// Sci. Comput. 39, 2009, "A-DEF2"). The term Q r takes what rounding leaves of residuals in the space out again.
+    /// Without it, conjugate gradients do not reduce that part, and r'z becomes negative when little else is left of r.
     fn apply(&self, r: &[f64], z: &mut [f64]) -> Result<()> {
         if self.is_started.get() {
             self.inner.apply(r, z)?;
@@ -117,7 +119,8 @@ impl Wrapper {
         self.context().inner.pc
     }
 
-    /// Set x = Q b and `rest` = b - A x, and take all residuals to have Q r = 0 up to rounding until the guard is dropped.
+    /// Set x = Q b and `rest` = b - A x, and take all residuals to have Q r = 0 up to rounding until the guard is
+    /// dropped.
     pub fn start(&self, rest: &mut Vec<f64>, x: &mut [f64]) -> Result<Started<'_>> {
         let context = self.context();
         x.fill(0.0);
@@ -135,7 +138,8 @@ impl Wrapper {
 
 impl Drop for Wrapper {
     fn drop(&mut self) {
-        // SAFETY: the references of this type; the solver has another preconditioner by now, or is gone, so that PETSc calls back no more.
+        // SAFETY: the references of this type; the solver has another preconditioner by now, or is gone, so that PETSc
+        // calls back no more.
         unsafe {
             let _ = petsc!(PCDestroy(&mut self.pc));
             let mut context = Box::from_raw(self.context);
@@ -156,8 +160,8 @@ impl Drop for Started<'_> {
 /// The callback for PCApply.
 unsafe extern "C" fn apply(pc: ffi::PC, r: ffi::Vec, z: ffi::Vec) -> ffi::PetscErrorCode {
     let (mut context, mut rows, mut from, mut to) = (null_mut::<c_void>(), 0, null(), null_mut());
-    // SAFETY: PETSc passes its own preconditioner with our context, and two vectors, whose arrays have that many entries here and belong to
-    // nobody else until they are given back.
+    // SAFETY: PETSc passes its own preconditioner with our context, and two vectors, whose arrays have that many
+    // entries here and belong to nobody else until they are given back.
     let done: Result<_> = (|| unsafe {
         petsc!(PCShellGetContext(pc, (&raw mut context).cast()))?;
         let context = &*context.cast::<CallbackData>();

@@ -17,7 +17,8 @@ pub struct KspIterate<'a> {
     pub x: &'a [f64],
     /// The norm of its residual, as the solver measures it (its `-ksp_norm_type`).
     pub residual: f64,
-    /// The norm of the residual of the first guess, which is zero or the exact solution in a [`Subspace`](super::Subspace).
+    /// The norm of the residual of the first guess, which is zero or the exact solution in a
+    /// [`Subspace`](super::Subspace).
     pub first: f64,
     /// The least eigenvalue of the preconditioned matrix that conjugate gradients in the natural norm have found so
     /// far.
@@ -81,7 +82,8 @@ impl Ksp {
         };
         let enough: &mut ConvergenceTest = if started.is_some() { &mut of_whole } else { enough };
         let (mut own, mut own_context, mut destroy) = (None, null_mut(), None);
-        // SAFETY: the solver's own test is taken out with its context, and put back below whatever the outcome of the solve.
+        // SAFETY: the solver's own test is taken out with its context, and put back below whatever the outcome of the
+        // solve.
         unsafe { petsc!(KSPGetAndClearConvergenceTest(self.ksp, &mut own, &mut own_context, &mut destroy)) }?;
         let mut norm = ffi::KSPNormType_KSP_NORM_DEFAULT;
         // SAFETY: the solver of this wrapper.
@@ -108,8 +110,8 @@ unsafe extern "C" fn is_enough(
     reason: *mut ffi::KSPConvergedReason,
     context: *mut c_void,
 ) -> ffi::PetscErrorCode {
-    // SAFETY: `solve_until` sets this callback with its `Test`, which outlives the solve and which nothing else uses meanwhile; PETSc
-    // passes its own solver and a variable for the reason.
+    // SAFETY: `solve_until` sets this callback with its `Test`, which outlives the solve and which nothing else uses
+    // meanwhile; PETSc passes its own solver and a variable for the reason.
     let (test, reason) = unsafe { (&mut *context.cast::<Test>(), &mut *reason) };
     if let Some(own) = test.own {
         // SAFETY: the solver's own test with its own context.

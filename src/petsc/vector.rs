@@ -46,7 +46,8 @@ impl Vector {
         }
         let vector = Vector { vec, len: values.len(), _session: session.clone() };
         let mut array = null_mut();
-        // SAFETY: PETSc's array is as long as `values`, for which the vector was created; nobody else has it between Get and Restore.
+        // SAFETY: PETSc's array is as long as `values`, for which the vector was created; nobody else has it between
+        // Get and Restore.
         unsafe {
             petsc!(VecSetBlockSize(vec, block_size as Int))?;
             petsc!(VecGetArray(vec, &mut array))?;
@@ -61,7 +62,8 @@ impl Vector {
         self.len
     }
 
-    /// Run `call`, which reads the slice `x` as this vector and writes to the slice `y` as the vector `to`. Messages name both slices.
+    /// Run `call`, which reads the slice `x` as this vector and writes to the slice `y` as the vector `to`. Messages
+    /// name both slices.
     ///
     /// # Errors
     /// When a slice is not as long as its vector, and those of the call.

@@ -69,8 +69,8 @@ pub(super) fn one() -> f64 {
 }
 
 impl BodySpec {
-    /// Return an isotropic body of linear elements on the group of cells `name`. Young's modulus (a stress, > 0) and Poisson's ratio (in
-    /// (-1, 0.5)) are numbers or functions of the coordinates.
+    /// Return an isotropic body of linear elements on the group of cells `name`. Young's modulus (a stress, > 0) and
+    /// Poisson's ratio (in (-1, 0.5)) are numbers or functions of the coordinates.
     #[track_caller]
     pub fn new(name: &str, young: impl Into<Field>, poisson: impl Into<Field>) -> Self {
         let place = Place::here("young, poisson");
@@ -89,7 +89,8 @@ impl BodySpec {
         Self { order, ..self }
     }
 
-    /// Prescribe displacements (x, y in the plane, x, y, z in space; lengths) on a boundary or at points. `None` leaves a component free.
+    /// Prescribe displacements (x, y in the plane, x, y, z in space; lengths) on a boundary or at points. `None` leaves
+    /// a component free.
     #[track_caller]
     pub fn fix<const N: usize>(mut self, on: &str, value: [Option<f64>; N]) -> Self {
         const { assert!(N <= 3, "displacements have three components at most") };
@@ -113,7 +114,8 @@ impl BodySpec {
         self
     }
 
-    /// Add a traction (x, y in the plane, x, y, z in space; stresses); its components are numbers or functions of the coordinates.
+    /// Add a traction (x, y in the plane, x, y, z in space; stresses); its components are numbers or functions of the
+    /// coordinates.
     #[track_caller]
     pub fn traction<const N: usize>(self, on: &str, traction: [impl Into<Field>; N]) -> Self {
         const { assert!(N <= 3, "tractions have three components at most") };
@@ -163,13 +165,13 @@ impl Check for BodySpec {
 pub const SPELLING: [&str; 2] =
     ["", "it is a prefix of PETSc options: a small letter, then small letters, digits and _"];
 
-/// The most numbers in the name of a body. With four, PETSc takes 24 times as long to look up the options of a solver; with eight it takes
-/// 40 320 times as long, which is 14 s.
+/// The most numbers in the name of a body. With four, PETSc takes 24 times as long to look up the options of a solver;
+/// with eight it takes 40 320 times as long, which is 14 s.
 const MOST_NUMBERS: usize = 4;
 
-/// Return the name of a body as the program writes it: small letters, digits and `_`, beginning with a letter. This is the one rule
-/// for names in scenes and for names of groups of cells in mesh files of any format. Capitals become small, other characters `_`, and
-/// `body_` stands before a name that begins with something else.
+/// Return the name of a body as the program writes it: small letters, digits and `_`, beginning with a letter. This is
+/// the one rule for names in scenes and for names of groups of cells in mesh files of any format. Capitals become
+/// small, other characters `_`, and `body_` stands before a name that begins with something else.
 pub fn plain(name: &str) -> String {
     let word: String = name.trim().chars().map(plain_character).collect();
     if word.starts_with(|c: char| c.is_ascii_lowercase()) { word } else { format!("body_{word}") }
@@ -201,9 +203,10 @@ pub(super) fn body_name<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Lo
 /// # Errors
 /// The name, with what to do about it.
 pub fn check_name(name: &Located<String>) -> Checked<()> {
-    let fault = match is_pattern(name) {
-        true => name.chars().any(|c| !is_in_name(c) && !"*?[]!-".contains(c)).then_some(SPELLING),
-        false => fault(name),
+    let fault = if is_pattern(name) {
+        name.chars().any(|c| !is_in_name(c) && !"*?[]!-".contains(c)).then_some(SPELLING)
+    } else {
+        fault(name)
     };
     let Some([label, help]) = fault else { return Ok(()) };
     Err(Error::scene(&name.place, format!("`{}` cannot be the name of a body", name.value)).label(label).help(help))
@@ -221,14 +224,15 @@ pub fn is_in_name(c: char) -> bool {
 
 /// Return why a body cannot have this name and what to do about it, as label and help; `None` for a good name.
 ///
-/// A body called like one of PETSc's own options could not have options of its own. A name in which such a word follows another, as in
-/// `brick_sub`, would give the body the options of a solver inside the solver of `brick` (`-brick_sub_ksp_type`).
+/// A body called like one of PETSc's own options could not have options of its own. A name in which such a word follows
+/// another, as in `brick_sub`, would give the body the options of a solver inside the solver of `brick`
+/// (`-brick_sub_ksp_type`).
 pub fn fault(name: &str) -> Option<[&'static str; 2]> {
     if !name.starts_with(|c: char| c.is_ascii_lowercase()) || !name.chars().all(is_in_name) {
         return Some(SPELLING);
     }
-    // PETSc repeats the look-up of an option without each number between two `_`, and each of these again with the numbers that are
-    // left: k! look-ups for k numbers
+    // PETSc repeats the look-up of an option without each number between two `_`, and each of these again with the
+    // numbers that are left: k! look-ups for k numbers
     let is_number = |word: &&str| !word.is_empty() && word.bytes().all(|byte| byte.is_ascii_digit());
     if name.split('_').filter(is_number).count() > MOST_NUMBERS {
         return Some(["a name of more than four numbers", "join numbers by a letter: brick_1x2x3"]);

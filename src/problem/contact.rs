@@ -11,14 +11,15 @@ use crate::expression::Field;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// A pair of contact surfaces and the layer between them, or a rule that finds such pairs: contact of all bodies that lie near each other. A pair
-/// of named surfaces of two bodies, and a later rule, take precedence.
+/// A pair of contact surfaces and the layer between them, or a rule that finds such pairs: contact of all bodies that
+/// lie near each other. A pair of named surfaces of two bodies, and a later rule, take precedence.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ContactSpec {
     /// write between = ["one", "other"], or between = "auto" with a distance
     ///
-    /// The two physical groups. In a rule that finds pairs both are the word "auto"; before an obstacle the second is "obstacle".
+    /// The two physical groups. In a rule that finds pairs both are the word "auto"; before an obstacle the second is
+    /// "obstacle".
     #[serde(default = "nothing", serialize_with = "write_between", deserialize_with = "between")]
     #[serde(skip_serializing_if = "is_with_obstacle")]
     #[schemars(with = "Option<Either<String, [String; 2]>>")]
@@ -49,16 +50,16 @@ pub struct ContactSpec {
     ///
     /// Largest angle between the normal of one facet and minus that of the other, > 0 and at most 90.
     ///
-    /// With the default a normal meets the other surface at most at twice its distance, and a facet covers at most twice its own
-    /// area there. Both tend to infinity as the angle grows to a right one.
+    /// With the default a normal meets the other surface at most at twice its distance, and a facet covers at most
+    /// twice its own area there. Both tend to infinity as the angle grows to a right one.
     #[serde(default = "angle")]
     pub angle: f64,
     /// angle in degrees beyond which facets meet at an edge, with a normal for each side
     ///
     /// It is > 0 and at most 180.
     ///
-    /// Twelve chords of a circle, the coarsest mesh of a round part, turn by 30 degrees each. A chamfer turns by 45 degrees. The
-    /// default is in between.
+    /// Twelve chords of a circle, the coarsest mesh of a round part, turn by 30 degrees each. A chamfer turns by 45
+    /// degrees. The default is in between.
     #[serde(default = "edge")]
     pub edge: f64,
     /// whether the distance of the meshes counts as zero
@@ -91,9 +92,11 @@ pub struct ContactSpec {
     pub moment: Option<Axial>,
     /// point about which an obstacle turns; the middle of its surface without this key
     pub at: Option<Point>,
-    /// force for which the first load step finds the offset of the gap, which later steps keep; a tension where the pair is bonded
+    /// force for which the first load step finds the offset of the gap, which later steps keep; a tension where the
+    /// pair is bonded
     ///
-    /// Its two surfaces may be of one body, and may look away from each other, as head and nut of a bolt without a mesh.
+    /// Its two surfaces may be of one body, and may look away from each other, as head and nut of a bolt without a
+    /// mesh.
     pub preload: Option<f64>,
     /// column of the table of load steps with the factor of these forces and motions
     pub path: Option<Located<String>>,
@@ -123,7 +126,8 @@ fn edge() -> f64 {
 }
 
 impl ContactSpec {
-    /// Return a pair of named surfaces of different bodies, with a layer between them. The gap is the distance of the meshes.
+    /// Return a pair of named surfaces of different bodies, with a layer between them. The gap is the distance of the
+    /// meshes.
     #[track_caller]
     pub fn new(first: &str, second: &str, layer: LayerSpec) -> Self {
         Self {

@@ -50,8 +50,8 @@ pub enum AxesSpec {
     Directions {
         /// Direction of axis 1.
         first: [Field; 3],
-        /// A vector in the plane of axes 1 and 2, on the side of axis 2. Without it, in plane problems, axis 2 is at a right angle to the
-        /// left of axis 1.
+        /// A vector in the plane of axes 1 and 2, on the side of axis 2. Without it, in plane problems, axis 2 is at a
+        /// right angle to the left of axis 1.
         second: Option<[Field; 3]>,
     },
     /// The axes x, y, z, turned about an axis.

@@ -64,7 +64,8 @@ impl History {
         self.steps.is_empty()
     }
 
-    /// Return whether the factors come from a table. Lines then may have factors of their own, and the last step need not be the full load.
+    /// Return whether the factors come from a table. Lines then may have factors of their own, and the last step need
+    /// not be the full load.
     pub fn is_table(&self) -> bool {
         self.table.is_some()
     }
@@ -123,7 +124,8 @@ impl History {
         contact.path.as_ref().filter(|_| self.is_table()).map_or(1.0, |path| self.factor(step, Some(path)))
     }
 
-    /// Return whether a contact keeps in a step what the step before has found: its preload has the same factor in both.
+    /// Return whether a contact keeps in a step what the step before has found: its preload has the same factor in
+    /// both.
     pub fn locks(&self, step: usize, contact: &ContactSpec) -> bool {
         let factor = |step: usize| self.preload_factor(step, contact);
         contact.preload.is_some() && step > 0 && factor(step) == factor(step - 1)
@@ -220,8 +222,8 @@ impl Check for History {
 }
 
 impl History {
-    /// Match the columns of a table of load steps with the lines of the bodies that name them by `path`. Set whether some loads have no
-    /// factor.
+    /// Match the columns of a table of load steps with the lines of the bodies that name them by `path`. Set whether
+    /// some loads have no factor.
     ///
     /// # Errors
     /// A path without a table or that is no column, and a column that no line names.

@@ -1,5 +1,5 @@
-//! What acts on a body from outside: supports, springs and loads. Each is read from a table of keys, `...Keys`, some of which exclude each other, and
-//! written as one.
+//! What acts on a body from outside: supports, springs and loads. Each is read from a table of keys, `...Keys`, some of
+//! which exclude each other, and written as one.
 
 use super::geometry::{Geometry, Plane};
 use super::pattern;
@@ -72,8 +72,8 @@ pub enum LoadKind {
         /// Whether all nodes of the boundary have one displacement. Otherwise the force is spread evenly.
         rigid: bool,
     },
-    /// Moment about the centre of the boundary (x, y, z; force times length), by tractions that are linear in the place. In the plane the
-    /// first two components are zero.
+    /// Moment about the centre of the boundary (x, y, z; force times length), by tractions that are linear in the
+    /// place. In the plane the first two components are zero.
     Moment([f64; 3]),
     /// Force and moment on a boundary that moves and turns as a rigid body.
     Turning {

@@ -90,8 +90,8 @@ pub struct AdaptedMesh {
 }
 
 impl MeshSource {
-    /// Return a Gmsh script with the numbers `set` in it. Its mesh is made once and kept in the cache. A script is a program: it
-    /// can start others and write files.
+    /// Return a Gmsh script with the numbers `set` in it. Its mesh is made once and kept in the cache. A script is a
+    /// program: it can start others and write files.
     #[track_caller]
     pub fn script(file: impl AsRef<Path>, set: &[(&str, f64)]) -> Self {
         let file = file.as_ref();
@@ -135,9 +135,10 @@ impl MeshKeys {
     /// Return the keys that the name of a file stands for.
     fn of_name(name: Located<String>) -> Self {
         let path = Path::new(&name.value);
-        match is_shape(path) || path.extension().is_some_and(|ending| ending == "geo") {
-            true => Self { geo: Some(name), ..Self::default() },
-            false => Self { msh: Some(name), ..Self::default() },
+        if is_shape(path) || path.extension().is_some_and(|ending| ending == "geo") {
+            Self { geo: Some(name), ..Self::default() }
+        } else {
+            Self { msh: Some(name), ..Self::default() }
         }
     }
 
@@ -196,9 +197,10 @@ fn check_number(name: &str, number: f64, place: &Place) -> Checked<()> {
     }
     // a slash parts the menus of Gmsh, as in `Sizes/h`
     let is_word = |c: char| c.is_ascii_alphanumeric() || "_/".contains(c);
-    match name.chars().all(is_word) && !name.starts_with(|c: char| c.is_ascii_digit()) && !name.is_empty() {
-        true => Ok(()),
-        false => Err(Error::scene(place, format!("`{name}` is no name of a Gmsh number"))),
+    if name.chars().all(is_word) && !name.starts_with(|c: char| c.is_ascii_digit()) && !name.is_empty() {
+        Ok(())
+    } else {
+        Err(Error::scene(place, format!("`{name}` is no name of a Gmsh number")))
     }
 }
 
@@ -257,9 +259,9 @@ pub struct GroupArrays {
     pub name: String,
     /// Dimension of the simplices: 0 points, 1 lines, 2 triangles, 3 tetrahedra.
     pub dimension: usize,
-    /// Point numbers from 0, simplex by simplex. Corners come first. The points inside edges follow in VTK's order of edges: 01
-    /// for a line, 01 12 02 for a triangle, 01 12 02 03 13 23 for a tetrahedron. Those of one edge divide it into k parts
-    /// from its first to its second end. The order k is at most 2 in space.
+    /// Point numbers from 0, simplex by simplex. Corners come first. The points inside edges follow in VTK's order of
+    /// edges: 01 for a line, 01 12 02 for a triangle, 01 12 02 03 13 23 for a tetrahedron. Those of one edge divide it
+    /// into k parts from its first to its second end. The order k is at most 2 in space.
     pub connectivity: Vec<u32>,
 }
 

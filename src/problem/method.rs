@@ -20,7 +20,8 @@ use toml::de::{DeTable, DeValue};
 pub struct MethodSpec {
     /// the method
     ///
-    /// A scene file without a name means [`MethodName::Robin`] if psi, gamma, robin or the increment rule is given ([`complete`]).
+    /// A scene file without a name means [`MethodName::Robin`] if psi, gamma, robin or the increment rule is given
+    /// ([`complete`]).
     pub name: MethodName,
     /// Robin zone: "none", "full", "active", a condition, or a list of one for each side
     pub psi: Zone,
@@ -52,9 +53,9 @@ impl MethodSpec {
     }
 }
 
-/// Write those defaults of `[method]` into its table that depend on other keys. The scene calls this after the overrides of the command line and
-/// before serde reads the table, so that the echo in the report has them like typed keys. They are the method and coefficient of the paper where its
-/// keys are used, and the tolerance of the residual.
+/// Write those defaults of `[method]` into its table that depend on other keys. The scene calls this after the
+/// overrides of the command line and before serde reads the table, so that the echo in the report has them like typed
+/// keys. They are the method and coefficient of the paper where its keys are used, and the tolerance of the residual.
 pub fn complete(method: &mut Spanned<DeValue<'_>>) {
     // what is written here has no place in the text
     let span = method.span().end..method.span().end;
@@ -235,7 +236,8 @@ impl Default for Gamma {
 #[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Start {
-    /// The solution with rigid bodies, each layer in series with a spring that stands for the surfaces of the two bodies.
+    /// The solution with rigid bodies, each layer in series with a spring that stands for the surfaces of the two
+    /// bodies.
     #[default]
     Auto,
     /// Zero normal displacement.
@@ -247,13 +249,15 @@ pub enum Start {
     ),
 }
 
-/// The rule for the Robin coefficient kappa on the zone. p is the law of the layer and c^k the compression at iterate k.
+/// The rule for the Robin coefficient kappa on the zone. p is the law of the layer and c^k the compression at iterate
+/// k.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum RobinRule {
     /// kappa = p'(c^k), as in the paper.
     Tangent,
-    /// The coefficient of the start in every iteration, made safe as in `Auto`. It needs one factorisation in a run. Theorem 3 allows it.
+    /// The coefficient of the start in every iteration, made safe as in `Auto`. It needs one factorisation in a run.
+    /// Theorem 3 allows it.
     Frozen,
     /// kappa = max(p'(c^k), F) everywhere on the contact surfaces; F > 0 is this number.
     Floor(
@@ -265,7 +269,8 @@ pub enum RobinRule {
     Auto,
 }
 
-/// The Robin zone: psi of (38), a characteristic function of a part of the contact surfaces. c is the compression of the layer.
+/// The Robin zone: psi of (38), a characteristic function of a part of the contact surfaces. c is the compression of
+/// the layer.
 #[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 #[schemars(with = "Either<String, Vec<String>>")]
 #[serde(rename_all = "lowercase")]
@@ -285,13 +290,15 @@ pub enum Zone {
     Sides(Box<[Zone; 2]>),
 }
 
-/// The rules that stop a run. At least one of `residual` and `increment` is given. The first rule that is met ends the run.
+/// The rules that stop a run. At least one of `residual` and `increment` is given. The first rule that is met ends the
+/// run.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StopRule {
     /// relative residual, or error of Newton's method; 1e-8 if `increment` is not given
     ///
-    /// Tolerance of the relative residual of sweeps, or of the largest relative error of Newton's method (docs/theory.md).
+    /// Tolerance of the relative residual of sweeps, or of the largest relative error of Newton's method
+    /// (docs/theory.md).
     pub residual: Option<f64>,
     /// the paper's rule on the increment
     ///
@@ -317,13 +324,14 @@ impl Default for StopRule {
 }
 
 impl StopRule {
-    /// Return the tolerance that relative errors inside a run refer to. It is that of the residual, or the square root of machine epsilon
-    /// where the increment alone ends the run.
+    /// Return the tolerance that relative errors inside a run refer to. It is that of the residual, or the square root
+    /// of machine epsilon where the increment alone ends the run.
     pub fn tolerance(&self) -> f64 {
         self.residual.unwrap_or(f64::EPSILON.sqrt())
     }
 
-    /// Return whether an iterate meets a rule. `residual` and `increment` are relative; the increment is NaN before the first update.
+    /// Return whether an iterate meets a rule. `residual` and `increment` are relative; the increment is NaN before the
+    /// first update.
     pub fn is_met(&self, residual: f64, increment: f64) -> bool {
         self.residual.is_some_and(|tolerance| residual <= tolerance)
             || self.increment.is_some_and(|tolerance| increment <= tolerance)

@@ -1,12 +1,12 @@
 //! What is to be solved, and how, as plain data: bodies, contacts, layers, and methods and solvers by name.
 //!
-//! A key of the scene is a field: its type, its default, and its doc comment, whose first paragraph is shown in refusals and in the JSON schema.
-//! serde reads and writes the structs, schemars describes them. Tables whose keys exclude each other have a struct of keys (`...Keys`) and become an enum.
-//! Values that are impossible or contradict each other are refused beside their struct ([`Check`](read::Check)), for scenes from files
-//! and from Rust alike.
+//! A key of the scene is a field: its type, its default, and its doc comment, whose first paragraph is shown in
+//! refusals and in the JSON schema. serde reads and writes the structs, schemars describes them. Tables whose keys
+//! exclude each other have a struct of keys (`...Keys`) and become an enum. Values that are impossible or contradict
+//! each other are refused beside their struct ([`Check`](read::Check)), for scenes from files and from Rust alike.
 //!
-//! Names of groups keep the place where they were written ([`Located`](crate::error::Located)): the mesh is read later, and a refusal of
-//! a group that it does not have points there.
+//! Names of groups keep the place where they were written ([`Located`](crate::error::Located)): the mesh is read later,
+//! and a refusal of a group that it does not have points there.
 
 pub mod body;
 pub mod contact;

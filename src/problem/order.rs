@@ -14,8 +14,8 @@ impl Order {
     pub const P1: Self = Self(1);
     /// Quadratic simplices.
     pub const P2: Self = Self(2);
-    /// Degree of the highest order. Interpolation at the nodes amplifies errors 5.3 times there, and the limit of steady means of contact
-    /// ([`basis`](crate::contact)) was derived for orders up to it.
+    /// Degree of the highest order. Interpolation at the nodes amplifies errors 5.3 times there, and the limit of
+    /// steady means of contact ([`basis`](crate::contact)) was derived for orders up to it.
     pub const HIGHEST: usize = 8;
 
     /// Return the order of a polynomial degree, `None` unless it is from 1 to 8.

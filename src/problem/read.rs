@@ -1,9 +1,10 @@
-//! What all settings share when they are read and written by serde: where the text stands, expressions, vectors, values with several forms, and the
-//! checks of tables.
+//! What all settings share when they are read and written by serde: where the text stands, expressions, vectors, values
+//! with several forms, and the checks of tables.
 //!
-//! serde hands a value no more than itself. What else reading needs, the [`Context`], is kept aside for the thread while a scene is read
-//! ([`within`]): the texts that places point into, the folder of the scene, its dimension, and its data. So expressions are compiled as
-//! they are read. A refusal that has more to say than an error of serde can hold is kept aside, too, and [`refusal`] takes it back.
+//! serde hands a value no more than itself. What else reading needs, the [`Context`], is kept aside for the thread
+//! while a scene is read ([`within`]): the texts that places point into, the folder of the scene, its dimension, and
+//! its data. So expressions are compiled as they are read. A refusal that has more to say than an error of serde can
+//! hold is kept aside, too, and [`refusal`] takes it back.
 
 use super::geometry::{Geometry, Plane};
 use crate::data::Library;
@@ -22,7 +23,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use toml::Spanned;
 
-/// The texts that a scene is read from: its file and the options that change it. The spans of all values count through one after the other.
+/// The texts that a scene is read from: its file and the options that change it. The spans of all values count through
+/// one after the other.
 #[derive(Debug, Clone, Default)]
 pub struct Sources(Vec<(usize, Arc<Source>)>);
 
@@ -83,7 +85,8 @@ impl Default for Context {
     }
 }
 
-/// A refusal on its way through serde, and the span of the table that it is about, if it is known better than serde knows it.
+/// A refusal on its way through serde, and the span of the table that it is about, if it is known better than serde
+/// knows it.
 type Kept = (Flaw, Option<Range<usize>>);
 
 thread_local! {
@@ -141,8 +144,8 @@ impl fmt::Display for Refused {
     }
 }
 
-/// Return the refusal that was kept aside, if the reading ended with one. `span` is that of serde's error, and `key_in` returns the span of a key
-/// in the table with a span.
+/// Return the refusal that was kept aside, if the reading ended with one. `span` is that of serde's error, and `key_in`
+/// returns the span of a key in the table with a span.
 pub fn refusal(
     sources: &Sources,
     span: Option<Range<usize>>,
@@ -175,7 +178,8 @@ impl From<Error> for Flaw {
     }
 }
 
-/// A table whose values may be impossible or contradict each other. It is checked while it is read, and as a part of a scene built in Rust.
+/// A table whose values may be impossible or contradict each other. It is checked while it is read, and as a part of a
+/// scene built in Rust.
 pub trait Check {
     /// Find the first flaw.
     fn check(&self, geometry: Geometry) -> Result<(), Flaw>;
@@ -201,9 +205,10 @@ impl<T: Check> Check for Option<T> {
 /// # Errors
 /// The flaw of the key.
 pub fn positive(key: &str, what: &str, value: f64) -> Result<(), Flaw> {
-    match value > 0.0 && value.is_finite() {
-        true => Ok(()),
-        false => Err(Flaw::new(key, format!("{what} is {}", shown(value)), "must be greater than 0", "")),
+    if value > 0.0 && value.is_finite() {
+        Ok(())
+    } else {
+        Err(Flaw::new(key, format!("{what} is {}", shown(value)), "must be greater than 0", ""))
     }
 }
 
@@ -215,7 +220,8 @@ pub fn at_least_one(key: &str, count: usize) -> Result<(), Flaw> {
     if count > 0 { Ok(()) } else { Err(Flaw::new(key, format!("`{key}` is 0"), "must be 1 or more", "")) }
 }
 
-/// Refuse a table that has several keys of which one can hold. The caret marks the later one; an option comes later than the scene file.
+/// Refuse a table that has several keys of which one can hold. The caret marks the later one; an option comes later
+/// than the scene file.
 ///
 /// # Errors
 /// The two keys.
@@ -314,7 +320,8 @@ pub fn file(name: Located<String>) -> Checked<Located<PathBuf>> {
     }
 }
 
-/// A value of one of several forms. `L` is the type of the items of a list, and `T` that of a table; [`IgnoredAny`] where they have no meaning.
+/// A value of one of several forms. `L` is the type of the items of a list, and `T` that of a table; [`IgnoredAny`]
+/// where they have no meaning.
 pub enum Form<L = IgnoredAny, T = IgnoredAny> {
     Flag,
     Integer(i64),
@@ -330,7 +337,8 @@ impl<L, T> Form<L, T> {
         E::invalid_type(Unexpected::Other("another form"), &"a form of the schema")
     }
 
-    /// Return the refusal of a form where a number or an expression belongs. It has a place, which serde does not know for items of lists.
+    /// Return the refusal of a form where a number or an expression belongs. It has a place, which serde does not know
+    /// for items of lists.
     fn instead_of_field(&self, place: &Place) -> Error {
         let found = match self {
             Self::Flag => "true or false",
@@ -385,8 +393,9 @@ impl<'de, L: Deserialize<'de>, T: Deserialize<'de>> Deserialize<'de> for Form<L,
     }
 }
 
-/// The smallest absolute value of a number that is not zero; its reciprocal is the largest. Energies contain squares of loads and displacements, 1e-220
-/// and more, and roundoff is 1e-16 of a force and as much of a displacement: 1e-252 in an energy, where the least normal double is 2e-308.
+/// The smallest absolute value of a number that is not zero; its reciprocal is the largest. Energies contain squares of
+/// loads and displacements, 1e-220 and more, and roundoff is 1e-16 of a force and as much of a displacement: 1e-252 in
+/// an energy, where the least normal double is 2e-308.
 const LEAST: f64 = 1e-110;
 
 /// A number or an expression. The data of the scene are known when it is read.
@@ -406,7 +415,8 @@ fn stepped<T>(coordinates: bool, read: impl FnOnce() -> T) -> T {
     result
 }
 
-/// Read a number or an expression in the coordinates and the factors of the load steps, for `#[serde(deserialize_with)]`.
+/// Read a number or an expression in the coordinates and the factors of the load steps, for
+/// `#[serde(deserialize_with)]`.
 ///
 /// # Errors
 /// Those of serde, and texts that are no expression.
@@ -445,7 +455,8 @@ fn field<E: de::Error, L, T>(value: Form<L, T>, place: &Place) -> Result<Field, 
     Ok(field)
 }
 
-/// Compile an expression in the coordinates, and with `iteration` in the iteration k, too; or in what else the key that is read may have.
+/// Compile an expression in the coordinates, and with `iteration` in the iteration k, too; or in what else the key that
+/// is read may have.
 ///
 /// # Errors
 /// A text that is no expression.

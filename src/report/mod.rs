@@ -1,4 +1,5 @@
-//! The page of a run: one HTML file that needs nothing from other places, written by `solve` from what it has in memory.
+//! The page of a run: one HTML file that needs nothing from other places, written by `solve` from what it has in
+//! memory.
 
 mod surface;
 
@@ -351,11 +352,10 @@ fn marks(marks: &[Mark]) -> String {
         if on.is_empty() { String::new() } else { format!("<span>{words}: {names}{more}</span>") }
     };
     let all: String = kinds.into_iter().map(of_kind).collect();
-    match all.is_empty() {
-        true => all,
-        false => {
-            format!("<div class=\"tools marks\"><label><input type=\"checkbox\" checked> Marks</label>{all}</div>")
-        }
+    if all.is_empty() {
+        all
+    } else {
+        format!("<div class=\"tools marks\"><label><input type=\"checkbox\" checked> Marks</label>{all}</div>")
     }
 }
 
@@ -402,18 +402,22 @@ fn times(report: &Report) -> String {
 /// Return the command of the run for a shell, after a change to its folder.
 fn command(report: &Report) -> String {
     let is_plain = |c: char| c.is_alphanumeric() || "-_./=:,+@%".contains(c);
-    let quoted = |word: &String| match !word.is_empty() && word.chars().all(is_plain) {
-        true => word.clone(),
-        false => format!("'{}'", word.replace('\'', "'\\''")),
+    let quoted = |word: &String| {
+        if !word.is_empty() && word.chars().all(is_plain) {
+            word.clone()
+        } else {
+            format!("'{}'", word.replace('\'', "'\\''"))
+        }
     };
     let words: Vec<String> = report.command.iter().map(quoted).collect();
     format!("cd {}\n{}", quoted(&report.directory), words.join(" "))
 }
 
 fn versions(report: &Report) -> String {
-    let options = match report.petsc_options.is_empty() {
-        true => "No PETSc options were given.".to_owned(),
-        false => format!("PETSc options: <code>{}</code>", escape(&report.petsc_options.join(" "))),
+    let options = if report.petsc_options.is_empty() {
+        "No PETSc options were given.".to_owned()
+    } else {
+        format!("PETSc options: <code>{}</code>", escape(&report.petsc_options.join(" ")))
     };
     let ranks = counted(report.ranks, "MPI rank", "MPI ranks");
     format!("winkler {}, PETSc {}, BLAS: {}, {ranks}. {options}", report.winkler, report.petsc, escape(&report.blas))

@@ -1,4 +1,5 @@
-//! The surfaces that the page shows: those of bodies after deformation, joined from the parts of all ranks, and those in contact.
+//! The surfaces that the page shows: those of bodies after deformation, joined from the parts of all ranks, and those
+//! in contact.
 
 use crate::fem::{lagrange, length};
 use crate::linalg::bounds;
@@ -13,8 +14,8 @@ use std::collections::{BTreeMap, HashMap};
 /// Faces of a tetrahedron, oriented as seen from outside, with the mid-edges of a quadratic one.
 const FACES: [[usize; 6]; 4] = [[0, 2, 1, 6, 5, 4], [0, 1, 3, 4, 8, 7], [1, 2, 3, 5, 9, 8], [0, 3, 2, 7, 9, 6]];
 
-/// Triangles of a body or of a contact surface. The surface of one rank's part of a body ends where the parts of other ranks begin, until
-/// [`Surface::join`] has joined them.
+/// Triangles of a body or of a contact surface. The surface of one rank's part of a body ends where the parts of other
+/// ranks begin, until [`Surface::join`] has joined them.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Surface {
     /// Name of the body or surface.
@@ -77,7 +78,8 @@ impl Surface {
         }
     }
 
-    /// Return the surface of a body from those of its parts. Parts share points with the same coordinates, and the faces between them are inside.
+    /// Return the surface of a body from those of its parts. Parts share points with the same coordinates, and the
+    /// faces between them are inside.
     pub fn join(parts: Vec<Self>) -> Self {
         let mut all = Self::default();
         let mut numbers: HashMap<[u64; 3], u32> = HashMap::new();
@@ -120,7 +122,8 @@ impl Surface {
         self
     }
 
-    /// Mark the places of a body. `is_closed` returns whether contact on a facet carries pressure, from its corners as points of the mesh.
+    /// Mark the places of a body. `is_closed` returns whether contact on a facet carries pressure, from its corners as
+    /// points of the mesh.
     pub fn mark<'m>(&mut self, marks: impl Iterator<Item = &'m Mark>, is_closed: &dyn Fn(&[u32]) -> bool) {
         let number: HashMap<u32, u32> = self.origin.iter().copied().zip(0..).collect();
         for mark in marks {
@@ -160,8 +163,8 @@ impl Surface {
         self.displacement.iter().map(|&u| length(u))
     }
 
-    /// Return the numbers of the view, with points relative to `low` (float32, which has too few digits for a small body far from the origin),
-    /// and values scaled to the range (uint16).
+    /// Return the numbers of the view, with points relative to `low` (float32, which has too few digits for a small
+    /// body far from the origin), and values scaled to the range (uint16).
     fn data(&self, low: [f64; 3], ends: [f64; 2], widest: f64) -> Value {
         let points: Vec<[f64; 3]> = self.points.iter().map(|x| relative(low, x)).collect();
         let floats = |points: &[[f64; 3]]| -> Vec<u8> {
@@ -179,7 +182,8 @@ impl Surface {
     }
 }
 
-/// Return the corners of the triangles into which the equally spaced points of a face cut it, as indices of this number of points.
+/// Return the corners of the triangles into which the equally spaced points of a face cut it, as indices of this number
+/// of points.
 fn split(points: usize) -> Vec<usize> {
     let order = (1..=Order::HIGHEST)
         .filter_map(Order::new)
@@ -278,8 +282,9 @@ fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
     }
 }
 
-/// Return the factor by which displacements are multiplied: the largest of 1, 2, 5 times a power of ten with which no displacement is
-/// longer than a twentieth of the diagonal of all bodies, but 1 at least. Motions can then be seen, and bodies still look like themselves.
+/// Return the factor by which displacements are multiplied: the largest of 1, 2, 5 times a power of ten with which no
+/// displacement is longer than a twentieth of the diagonal of all bodies, but 1 at least. Motions can then be seen, and
+/// bodies still look like themselves.
 fn magnification(bodies: &[Surface]) -> f64 {
     let [low, high] = bounds(bodies.iter().flat_map(|part| &part.points).copied());
     let most = bodies.iter().flat_map(Surface::travel).fold(0.0, f64::max);
@@ -336,7 +341,8 @@ mod tests {
         assert_eq!(magnification(&[whole]), 5.0);
     }
 
-    /// The triangles of a face of order k cover it once: with the corners 0, (1, 0) and (0, 1) each has the area 1/(2 k^2), with one sign.
+    /// The triangles of a face of order k cover it once: with the corners 0, (1, 0) and (0, 1) each has the area 1/(2
+    /// k^2), with one sign.
     #[test]
     fn faces_of_any_order_are_covered() {
         for order in (1..=Order::HIGHEST).filter_map(Order::new) {

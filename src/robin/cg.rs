@@ -1,8 +1,10 @@
-//! The linear step by conjugate gradients preconditioned by the Robin sweep: every iteration solves each body once, independently.
+//! The linear step by conjugate gradients preconditioned by the Robin sweep: every iteration solves each body once,
+//! independently.
 //!
-//! One iteration carries information from a body to its neighbours only, so the rigid motions Z that supports leave free are deflated
-//! (balancing: Mandel, Comm. Numer. Meth. Engng 9, 1993). With the matrix H of (35), a correction z = G^-1 r becomes (I - Z (Z'HZ)^- Z'H) z: what is left of z after whole bodies have
-//! moved until they are in balance again. Every rank has all contact points, so this needs no message and no solve.
+//! One iteration carries information from a body to its neighbours only, so the rigid motions Z that supports leave
+//! free are deflated (balancing: Mandel, Comm. Numer. Meth. Engng 9, 1993). With the matrix H of (35), a correction z =
+//! G^-1 r becomes (I - Z (Z'HZ)^- Z'H) z: what is left of z after whole bodies have moved until they are in balance
+//! again. Every rank has all contact points, so this needs no message and no solve.
 
 use super::sweep::{Coefficient, Sweep, Sweeper};
 use crate::error::Result;
@@ -16,8 +18,8 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 /// Most iterations of a linear step: long before, rounding spoils the conjugacy of the directions.
 pub(super) const MOST_SWEEPS: usize = 400;
 
-/// Iterations whose gain of energy estimates the error before them (Hestenes and Stiefel). What later iterations gain is missing; the least eigenvalue covers that
-/// ([`Lanczos::squared_error`]).
+/// Iterations whose gain of energy estimates the error before them (Hestenes and Stiefel). What later iterations gain
+/// is missing; the least eigenvalue covers that ([`Lanczos::squared_error`]).
 const GAINS: usize = 4;
 
 /// Relative accuracy of iterative solves of bodies as preconditioner, and of a step.
@@ -90,9 +92,9 @@ impl LinearStep for SweepCg {
     }
 }
 
-/// Solve (K + B' diag(springs) B) x = r with the Robin term that the model carries, until `enough` says so or for `most` iterations. Return the solution
-/// with the coefficients of the iteration. `springs`
-/// are omega kappa at the points (n). `least` is the least eigenvalue of earlier systems, infinite if there were none: the first iterations do
+/// Solve (K + B' diag(springs) B) x = r with the Robin term that the model carries, until `enough` says so or for
+/// `most` iterations. Return the solution with the coefficients of the iteration. `springs` are omega kappa at the
+/// points (n). `least` is the least eigenvalue of earlier systems, infinite if there were none: the first iterations do
 /// not see the slow modes.
 pub(super) fn conjugate_gradients(
     model: &mut Model,
@@ -167,8 +169,8 @@ impl<'a> Gradients<'a> {
         Self { springs, coarse, r, work, x, lanczos, previous: None }
     }
 
-    /// Return the next direction: the deflated correction, conjugate to the previous direction. `change` is z'(r - r_previous): with this
-    /// flexible rule, the preconditioner may be an inexact solve.
+    /// Return the next direction: the deflated correction, conjugate to the previous direction. `change` is z'(r -
+    /// r_previous): with this flexible rule, the preconditioner may be an inexact solve.
     fn direction(&mut self, model: &Model, mut correction: Field, change: f64) -> Field {
         let force: Vec<f64> = self.springs.iter().zip(correction.closing()).map(|(spring, s)| spring * s).collect();
         let y = self.coarse.solve(&Motions::of(model).work(&force));
@@ -194,7 +196,8 @@ impl<'a> Gradients<'a> {
         model.exchange.sum(&mut sums);
         let rigid = DVector::from_vec(p.rigid.concat());
         let (curvature, slope) = (sums[0] + dot(&spring, &closing), sums[1] + self.work.dot(&rigid));
-        // p'Gp is at least r'z, so if deflation leaves only rounding of p, its curvature is negligible compared with r'z
+        // p'Gp is at least r'z, so if deflation leaves only rounding of p, its curvature is negligible compared with
+        // r'z
         if !(slope > 0.0 && curvature > f64::EPSILON * rz) {
             return false;
         }
@@ -228,8 +231,8 @@ pub(super) struct Lanczos {
     energy: f64,
 }
 
-/// Iterations after which recent gains alone estimate the error: the eigenvalues of the Lanczos matrix take n^3 operations in each of n iterations, and the least one
-/// is known by then.
+/// Iterations after which recent gains alone estimate the error: the eigenvalues of the Lanczos matrix take n^3
+/// operations in each of n iterations, and the least one is known by then.
 const SETTLED: usize = 64;
 
 impl Lanczos {
@@ -240,14 +243,15 @@ impl Lanczos {
         self.energy += gain;
     }
 
-    /// Estimate the squared energy norm of the error where r'G^-1 r is `rz`. It is at most `rz` over the least eigenvalue, and about what the
-    /// last iterations gained.
+    /// Estimate the squared energy norm of the error where r'G^-1 r is `rz`. It is at most `rz` over the least
+    /// eigenvalue, and about what the last iterations gained.
     fn squared_error(&self, rz: f64) -> f64 {
         let lately = match self.gains.len() {
             0 => return if rz > 0.0 { f64::INFINITY } else { 0.0 },
             n => self.gains[n - n.min(GAINS)..].iter().sum(),
         };
-        // both estimates are too small as long as a slow mode has not appeared; if the solve ends early, the recent gains are all there are
+        // both estimates are too small as long as a slow mode has not appeared; if the solve ends early, the recent
+        // gains are all there are
         let low = if self.alphas.len() <= SETTLED {
             self.spectrum().map_or(0.0, |(low, _)| low.min(self.least))
         } else {
@@ -261,7 +265,8 @@ impl Lanczos {
         }
     }
 
-    /// Return the extreme eigenvalues of the Lanczos matrix; none before the first iteration, or if they are not positive and finite.
+    /// Return the extreme eigenvalues of the Lanczos matrix; none before the first iteration, or if they are not
+    /// positive and finite.
     pub fn spectrum(&self) -> Option<(f64, f64)> {
         let (n, alphas, betas) = (self.alphas.len(), &self.alphas, &self.betas);
         let mut t = DMatrix::zeros(n, n);

@@ -1,14 +1,15 @@
 //! Moving obstacles in the sweep: an obstacle has no stiffness, so that its motions are unknowns of the body before it.
 //!
-//! By itself, an obstacle would follow the body only as far as the layer gives way: where the body has the stiffness k and the layer kappa, an error falls
-//! by the factor 1 - gamma k/(2 kappa) in a sweep. Together they have the system
+//! By itself, an obstacle would follow the body only as far as the layer gives way: where the body has the stiffness k
+//! and the layer kappa, an error falls by the factor 1 - gamma k/(2 kappa) in a sweep. Together they have the system
 //!
 //! ```text
 //! G   z + B'W N a = r             W = omega psi kappa at the points,  N: their closings by the motions
 //! N'W B z + N'W N a = s
 //! ```
 //!
-//! which is solved by z = G^-1 r - X a and a = S^-1 (s - X'r), with the columns X = G^-1 B'W N and the stiffness S of the motions (-X, 1).
+//! which is solved by z = G^-1 r - X a and a = S^-1 (s - X'r), with the columns X = G^-1 B'W N and the stiffness S of
+//! the motions (-X, 1).
 
 use crate::error::Result;
 use crate::linalg::dot;
@@ -69,8 +70,8 @@ pub(super) struct Obstacles {
 }
 
 impl Obstacles {
-    /// Return the motions of the obstacles for the Robin term that the model carries; none if no obstacle moves, or if `known` is of that term. Each
-    /// costs a solve in every body. Collective.
+    /// Return the motions of the obstacles for the Robin term that the model carries; none if no obstacle moves, or if
+    /// `known` is of that term. Each costs a solve in every body. Collective.
     pub fn update(
         known: Option<Self>,
         solve: &mut SolveBodies,

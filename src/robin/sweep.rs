@@ -1,5 +1,5 @@
-//! One sweep (41): every body solves its own linear problem, independently of the others. A sweep needs the Robin coefficient, and a start, which is
-//! a trace extended into every body.
+//! One sweep (41): every body solves its own linear problem, independently of the others. A sweep needs the Robin
+//! coefficient, and a start, which is a trace extended into every body.
 
 use super::obstacle::{self, Obstacles, is_obstacle};
 use crate::error::{Error, Result};
@@ -49,8 +49,8 @@ pub struct Sweeper {
 }
 
 impl Sweeper {
-    /// Solve G_s z_s = r_s in every body at `iterate` with its `layer`, with the Robin term that the model carries. The requests `asked` of this rank go with
-    /// the message.
+    /// Solve G_s z_s = r_s in every body at `iterate` with its `layer`, with the Robin term that the model carries. The
+    /// requests `asked` of this rank go with the message.
     pub fn sweep(&mut self, model: &mut Model, iterate: &Field, layer: &Layer, asked: u8) -> Result<Sweep> {
         let products = model.multiply(&iterate.displacements);
         let (residual, energy) = residual(model, products, iterate, &layer.force);
@@ -58,7 +58,8 @@ impl Sweeper {
         self.with_obstacles(model, sweep, None)
     }
 
-    /// Apply G^-1 to any residual as a preconditioner; the result keeps the residual. `product` of the result is `other`'z.
+    /// Apply G^-1 to any residual as a preconditioner; the result keeps the residual. `product` of the result is
+    /// `other`'z.
     pub fn precondition(&mut self, model: &mut Model, residual: Vec<Vec<f64>>, other: &[Vec<f64>]) -> Result<Sweep> {
         let sweep = self.solve(model, residual, Energy::default(), Some(other), 0)?;
         self.with_obstacles(model, sweep, Some(other))
@@ -84,7 +85,8 @@ impl Sweeper {
         Ok(sweep)
     }
 
-    /// Solve in every body that lives on this rank, and sum the results over the ranks in one message. With `other` the solves are those of a preconditioner.
+    /// Solve in every body that lives on this rank, and sum the results over the ranks in one message. With `other` the
+    /// solves are those of a preconditioner.
     fn solve(
         &mut self,
         model: &mut Model,
@@ -139,8 +141,8 @@ impl Sweeper {
 
 /// The zone and the rule of the Robin term, with the weights that a frozen rule keeps.
 ///
-/// Any symmetric positive definite G leads to the same solution; G decides how fast. There is one weight for each contact row, in the layout
-/// of a trace vector, because the two bodies of a pair may need different weights.
+/// Any symmetric positive definite G leads to the same solution; G decides how fast. There is one weight for each
+/// contact row, in the layout of a trace vector, because the two bodies of a pair may need different weights.
 pub struct Coefficient {
     zone: Zone,
     /// The surfaces of `between` at sides a and b of each pair.
@@ -156,7 +158,8 @@ impl Coefficient {
         Self { zone, sides, rule, frozen: None }
     }
 
-    /// Return omega psi kappa of every contact row (2n, layout of a trace vector) for layers in these states in iteration `k`.
+    /// Return omega psi kappa of every contact row (2n, layout of a trace vector) for layers in these states in
+    /// iteration `k`.
     ///
     /// # Errors
     /// A condition of a zone has no value at a contact point; all ranks find this.
@@ -212,8 +215,8 @@ fn is_inside(zone: &Zone, surface: usize, tangent: f64, x: [f64; 3], k: usize) -
     }
 }
 
-/// Return the first body that is unconstrained under the Robin term `weight` (omega psi kappa of the contact rows, 2n), and its motion. Springs
-/// below [`TOLERANCE`] of the largest stiffness in the body are lost in its rounding.
+/// Return the first body that is unconstrained under the Robin term `weight` (omega psi kappa of the contact rows, 2n),
+/// and its motion. Springs below [`TOLERANCE`] of the largest stiffness in the body are lost in its rounding.
 pub fn underconstrained(model: &Model, weight: &[f64]) -> Option<NamedMotion> {
     (0..model.bodies.len()).find_map(|body| {
         let slot = &model.bodies[body];
@@ -226,11 +229,12 @@ pub fn underconstrained(model: &Model, weight: &[f64]) -> Option<NamedMotion> {
     })
 }
 
-/// Share of the stiffness of the body's own surface below which a motion is not held safely. At this share, a sweep would move the body by a
-/// thousand times what its surface gives way.
+/// Share of the stiffness of the body's own surface below which a motion is not held safely. At this share, a sweep
+/// would move the body by a thousand times what its surface gives way.
 const WEAK: f64 = 1e-3;
 
-/// Return the weights (2n). Every body that they do not hold safely gets at least the stiffness of its own surface as a whole.
+/// Return the weights (2n). Every body that they do not hold safely gets at least the stiffness of its own surface as a
+/// whole.
 fn constrained(model: &Model, mut weight: Vec<f64>) -> Vec<f64> {
     let holding = model.holding_stiffness();
     for (body, _) in model.bodies.iter().enumerate().filter(|(_, slot)| !slot.motions.is_empty()) {
@@ -262,8 +266,9 @@ fn springs(model: &Model, body: usize, weight: &[f64]) -> DMatrix<f64> {
     })
 }
 
-/// Springs of the constraint B u = t over the stiffness of the nodes under them. The trace of an extension differs by about a ten-thousandth of what
-/// loads move the body; with 1e6 its rounding shows in the last of eight digits of Aitken's rule.
+/// Springs of the constraint B u = t over the stiffness of the nodes under them. The trace of an extension differs by
+/// about a ten-thousandth of what loads move the body; with 1e6 its rounding shows in the last of eight digits of
+/// Aitken's rule.
 const STIFF: f64 = 1e4;
 
 /// Give every body the Robin term of its extension, and set up the solvers of those that have none yet. A refusal of
@@ -291,8 +296,8 @@ pub fn stiff_joint_springs(model: &Model) -> Vec<f64> {
 /// # Errors
 /// Failures of the solver library.
 ///
-/// The sweep (41) depends on the iterate through its traces only, so a start is a trace. The extension minimises the energy of the body among
-/// all displacements with that trace, which springs much stiffer than the body impose.
+/// The sweep (41) depends on the iterate through its traces only, so a start is a trace. The extension minimises the
+/// energy of the body among all displacements with that trace, which springs much stiffer than the body impose.
 pub fn extend(model: &mut Model, trace: &[f64]) -> Result<std::result::Result<Field, Failure>> {
     let springs = stiff_springs(model);
     model.robin(&springs)?;

@@ -1,4 +1,5 @@
-//! The size of a contact and where it ends: in the plane from the curve between the contact points, in space from the areas of the points.
+//! The size of a contact and where it ends: in the plane from the curve between the contact points, in space from the
+//! areas of the points.
 
 use super::stages::Done;
 use crate::discretize::Neighbours;
@@ -6,10 +7,11 @@ use crate::estimate::softness;
 use crate::fem::{length, minus};
 use crate::output::Extent;
 
-/// Return the size of the contact of pair `i`, and in the plane the points where it begins or ends, in the order of the contact points.
+/// Return the size of the contact of pair `i`, and in the plane the points where it begins or ends, in the order of the
+/// contact points.
 ///
-/// Along a curve each interval between neighbouring points is closed, open or divided by an end. The intervals are chords; together they have the length
-/// (area) of the points.
+/// Along a curve each interval between neighbouring points is closed, open or divided by an end. The intervals are
+/// chords; together they have the length (area) of the points.
 pub fn of(done: &Done, i: usize) -> (Extent, Vec<[f64; 3]>) {
     let (model, layer) = (done.model(), &done.outcome.layer);
     let (pair, range) = (&model.pairs[i], model.range(i));
@@ -43,18 +45,20 @@ pub fn of(done: &Done, i: usize) -> (Extent, Vec<[f64; 3]>) {
     (Extent::new(pair.measure, scale * closed, scale * open), ends.into_iter().map(|(_, x)| x).collect())
 }
 
-/// Return where contact ends between a closed and an open point, as a share t of the interval from the closed one. `c` is the compression of the closed
-/// point and the opening of the other one, and `give` the deflection h p/E* of the bodies under the pressure p of the closed point over the interval h.
+/// Return where contact ends between a closed and an open point, as a share t of the interval from the closed one. `c`
+/// is the compression of the closed point and the opening of the other one, and `give` the deflection h p/E* of the
+/// bodies under the pressure p of the closed point over the interval h.
 ///
-/// Beside the end of a contact without a layer, p is A sqrt(d) at the distance d inside, and the opening 4/(3 E*) A d^(3/2) outside, as in Hertz's
-/// solution. A soft layer adds a compression B d inside and an opening B d outside. With A and B from the closed point, t h from the end, the
-/// opening of the other one is
+/// Beside the end of a contact without a layer, p is A sqrt(d) at the distance d inside, and the opening 4/(3 E*) A
+/// d^(3/2) outside, as in Hertz's solution. A soft layer adds a compression B d inside and an opening B d outside. With
+/// A and B from the closed point, t h from the end, the opening of the other one is
 ///
 /// ```text
 /// 4/3 give (1 - t)^(3/2) t^(-1/2) + c (1 - t)/t
 /// ```
 ///
-/// which decreases from infinity to zero. Under a layer that is soft beside the bodies, where `give` is small, it is linear interpolation.
+/// which decreases from infinity to zero. Under a layer that is soft beside the bodies, where `give` is small, it is
+/// linear interpolation.
 fn end([compression, opening]: [f64; 2], give: f64) -> f64 {
     let beyond = |t: f64| (1.0 - t) * (4.0 / 3.0 * give * (t * (1.0 - t)).sqrt() + compression) > opening * t;
     let (mut low, mut high) = (0.0, 1.0);
@@ -69,7 +73,8 @@ fn end([compression, opening]: [f64; 2], give: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Pressure and opening of two half-planes pressed together by Hertz are those of a contact that ends at t; so are the lines of a soft layer.
+    /// Pressure and opening of two half-planes pressed together by Hertz are those of a contact that ends at t; so are
+    /// the lines of a soft layer.
     #[test]
     fn the_end_between_two_points() {
         for t in [0.02, 0.3, 0.5, 0.97] {

@@ -1,4 +1,5 @@
-//! The inner solvers: those requested, or the program's choice with its reason ([`plan`](super::plan)), and how they are made.
+//! The inner solvers: those requested, or the program's choice with its reason ([`plan`](super::plan)), and how they
+//! are made.
 
 use super::in_words;
 use super::plan::{BodyPlan, Plan, SolverRequest, plan};
@@ -26,7 +27,8 @@ pub struct SolverFactory<'a> {
     asked: SolverRequest,
     /// Options that the user wrote for the solvers.
     typed: UserOptions,
-    /// Interpolation of the displacements of all bodies from linear ones, if bodies have quadratic elements and multigrid.
+    /// Interpolation of the displacements of all bodies from linear ones, if bodies have quadratic elements and
+    /// multigrid.
     pub interpolation: Option<Prolongation>,
     /// Rigid motions of all bodies, on the rows of this rank in the matrix of all bodies, if its multigrid is GAMG.
     pub near_null_space: Vec<Vec<f64>>,
@@ -79,7 +81,8 @@ impl<'a> SolverFactory<'a> {
         })
     }
 
-    /// Return the reason for the solvers in words. Each kind of solver is named once, with the reason of its largest body.
+    /// Return the reason for the solvers in words. Each kind of solver is named once, with the reason of its largest
+    /// body.
     pub fn reason(&self) -> String {
         let is_typed = self.plan.bodies.iter().any(|body| body.facts.options.asks_for_ksp());
         let is_apart = self.asked.may_join() && self.plan.linear == Linear::Sweeps && is_typed;
@@ -107,7 +110,8 @@ impl<'a> SolverFactory<'a> {
         kinds.into_iter().filter_map(of_kind).collect::<Vec<_>>().join("; ")
     }
 
-    /// Return the options of all PETSc solvers of a run: of bodies that sweeps solve by one, or of the matrix of all bodies.
+    /// Return the options of all PETSc solvers of a run: of bodies that sweeps solve by one, or of the matrix of all
+    /// bodies.
     pub fn options(&self) -> Vec<Chosen> {
         match self.plan.linear {
             Linear::Dense => Vec::new(),

@@ -1,5 +1,5 @@
-//! A run: from a scene to what was found, for the library and for the command line. Its types are the [`stages`], each made from
-//! the one before by [`build`], [`set_up`], [`iterate`] and [`estimate`].
+//! A run: from a scene to what was found, for the library and for the command line. Its types are the [`stages`], each
+//! made from the one before by [`build`], [`set_up`], [`iterate`] and [`estimate`].
 //!
 //! Errors are failures of the solver library, but for what functions say of their own.
 

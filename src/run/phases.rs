@@ -1,5 +1,5 @@
-//! The steps from a scene to a solved problem, by the [`stages`](super::stages): mesh, discretisation, inner solvers, options, method,
-//! iteration. A problem takes over what the run of another scene before it has left.
+//! The steps from a scene to a solved problem, by the [`stages`](super::stages): mesh, discretisation, inner solvers,
+//! options, method, iteration. A problem takes over what the run of another scene before it has left.
 
 use super::inner::SolverFactory;
 use super::meshed::{self, MeshFacts, SceneMesh};
@@ -139,10 +139,7 @@ fn build_on(
     warnings.extend(notes.iter().cloned());
     warnings.extend(inner.applied_once().into_iter().chain(inner.idle_options()));
     let has_page = scene.output.report && session.rank() == 0;
-    let marks = match has_page && marks.is_empty() {
-        true => mesh.marks(&stepped.bodies, &discrete.model.pairs),
-        false => marks,
-    };
+    let marks = if has_page && marks.is_empty() { mesh.marks(&stepped.bodies, &discrete.model.pairs) } else { marks };
     Ok(Built {
         scene,
         marks,
@@ -178,7 +175,8 @@ pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clo
         Some(start) => start,
         None => discretize::start(&scene, &built.discrete)?.into(),
     };
-    // A condensed body lives on one rank. If its factorisation is refused, no other rank may wait for it in what follows.
+    // A condensed body lives on one rank. If its factorisation is refused, no other rank may wait for it in what
+    // follows.
     collectively(session, built.discrete.model.condense())?;
     let method = collectively(session, make(session, &mut built, &mut start))?;
     let names: Vec<&str> = built.discrete.bodies.iter().map(|body| body.name.as_str()).collect();
@@ -219,8 +217,8 @@ pub fn targets(scene: &Scene) -> String {
     rules.collect::<Vec<_>>().join(" or ")
 }
 
-/// Make the method of a scene and set up the solvers that it needs. Errors occur before the first sweep. If the set-up finds an
-/// automatic start, it is stored in `start`.
+/// Make the method of a scene and set up the solvers that it needs. Errors occur before the first sweep. If the set-up
+/// finds an automatic start, it is stored in `start`.
 fn make(session: &Session, built: &mut Built, start: &mut InitialGuess) -> Result<Method> {
     let scene = built.scene.clone();
     let rule = || gamma::rule(&scene.method.gamma, &scene.own_rules);

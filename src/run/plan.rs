@@ -1,7 +1,8 @@
 //! The plan of a run's linear algebra: from facts of the bodies and from what is asked for to the inner solvers.
 //!
-//! Newton's method joins the bodies in one matrix, or in one Schur complement if all are condensed. They then need no solver of their own.
-//! If options are typed for one body, or the method asks for it, every body has one, and sweeps solve the linear steps. The first rank makes the plan, and the other ranks follow it.
+//! Newton's method joins the bodies in one matrix, or in one Schur complement if all are condensed. They then need no
+//! solver of their own. If options are typed for one body, or the method asks for it, every body has one, and sweeps
+//! solve the linear steps. The first rank makes the plan, and the other ranks follow it.
 
 use crate::parallel::owners;
 use crate::problem::{Linear, MethodName, Preset};
@@ -55,7 +56,8 @@ pub struct BodyPlan {
     pub reason: String,
 }
 
-/// Largest number of dofs of all condensed bodies together for which their dense matrix is factored. It takes 0.2 s and 250 MB.
+/// Largest number of dofs of all condensed bodies together for which their dense matrix is factored. It takes 0.2 s and
+/// 250 MB.
 const DENSE: usize = 3000;
 
 /// Return the plan for these bodies, without the interface dofs of condensed ones.
@@ -149,7 +151,8 @@ fn in_plane(body: &BodyFacts, asked: &SolverRequest, memory: &mut usize) -> (Pre
     (preset, reason)
 }
 
-/// Choose the solvers of bodies in space with their reasons, which are solved together or are one body, and take their memory. Return the estimated seconds, too.
+/// Choose the solvers of bodies in space with their reasons, which are solved together or are one body, and take their
+/// memory. Return the estimated seconds, too.
 fn in_space(bodies: &[BodyFacts], asked: &SolverRequest, memory: &mut usize) -> (Vec<(Preset, String)>, f64) {
     let is_kept = bodies.iter().all(|body| body.is_kept);
     let [direct, multigrid] = cost::of_both(bodies, |body| asked.may_condense(body), asked.method, asked.may_join());
@@ -173,7 +176,8 @@ fn in_space(bodies: &[BodyFacts], asked: &SolverRequest, memory: &mut usize) -> 
     (choices, if is_direct { direct.seconds } else { multigrid.seconds })
 }
 
-/// Return the solver of linear steps for bodies with these presets. Where the program chose them, bodies first get presets that one matrix can have.
+/// Return the solver of linear steps for bodies with these presets. Where the program chose them, bodies first get
+/// presets that one matrix can have.
 fn linear_step(asked: &SolverRequest, bodies: &mut [BodyPlan]) -> Linear {
     let is_auto = asked.method == MethodName::Auto;
     let is_typed = |body: &BodyPlan| body.facts.options.asks_for_ksp();
@@ -205,8 +209,8 @@ fn on_contact(bodies: &[BodyPlan]) -> usize {
     bodies.iter().filter(|body| body.preset == Preset::Condensed).map(|body| body.facts.interface).sum()
 }
 
-/// Give all bodies presets that Newton's method can join. They get multigrid if one of them needs it. In the plane they get one
-/// factorisation if together they have too many dofs on the contact for one dense matrix.
+/// Give all bodies presets that Newton's method can join. They get multigrid if one of them needs it. In the plane they
+/// get one factorisation if together they have too many dofs on the contact for one dense matrix.
 fn agree(bodies: &mut [BodyPlan]) {
     let dense = on_contact(bodies);
     let (preset, why) = match bodies.iter().find(|body| body.preset == Preset::Hypre) {
@@ -221,16 +225,16 @@ fn agree(bodies: &mut [BodyPlan]) {
     }
 }
 
-/// Dofs for which a rank could solve in the time of the messages of a distributed body. An iteration of conjugate gradients with
-/// multigrid takes 0.5 us per dof (docs/parallel.md, 48^3: 42 s, 116 iterations, 705 894 dofs). It has some 50 messages of 10 us:
-/// four exchanges with neighbours on each of eight levels, and a few sums.
+/// Dofs for which a rank could solve in the time of the messages of a distributed body. An iteration of conjugate
+/// gradients with multigrid takes 0.5 us per dof (docs/parallel.md, 48^3: 42 s, 116 iterations, 705 894 dofs). It has
+/// some 50 messages of 10 us: four exchanges with neighbours on each of eight levels, and a few sums.
 ///
-/// Measurements on two ranks of one machine (`patch-3d`, nu = 2, `ncg`, hypre) had 3993, 10 125 and 27 783 dofs. An iteration
-/// takes -28, 80 and 339 us more than half of that of one rank, which is the work of 0, 540 and 1900 dofs.
+/// Measurements on two ranks of one machine (`patch-3d`, nu = 2, `ncg`, hypre) had 3993, 10 125 and 27 783 dofs. An
+/// iteration takes -28, 80 and 339 us more than half of that of one rank, which is the work of 0, 540 and 1900 dofs.
 const MESSAGES: usize = 1000;
 
-/// Distribute the largest bodies over all ranks, as many as make a sweep shortest. Each other body stays whole on one rank. If there are as many
-/// bodies as ranks and they are about equally large, all stay whole.
+/// Distribute the largest bodies over all ranks, as many as make a sweep shortest. Each other body stays whole on one
+/// rank. If there are as many bodies as ranks and they are about equally large, all stay whole.
 fn distribute(ranks: usize, bodies: &mut [BodyPlan]) {
     let may = |body: &BodyPlan| {
         let options = &body.facts.options;
@@ -276,7 +280,8 @@ mod tests {
 
     const GIGABYTES: usize = 8_000_000_000;
 
-    /// Return a body of n x n x m boxes with linear elements in space, or with n x m boxes in the plane, whose lower surface is the contact.
+    /// Return a body of n x n x m boxes with linear elements in space, or with n x m boxes in the plane, whose lower
+    /// surface is the contact.
     fn body(dimension: usize, n: usize, m: usize) -> BodyFacts {
         let interface = (n + 1).pow(dimension as u32 - 1);
         BodyFacts {
@@ -357,8 +362,9 @@ mod tests {
         assert_eq!(of_pc("jacobi", true), Linear::Direct);
     }
 
-    /// A single body is distributed. If bodies are unequal, the large one is distributed, and the other one if that gains more
-    /// than its messages take. If there are as many equal bodies as ranks, none is distributed. With one body too many, one is.
+    /// A single body is distributed. If bodies are unequal, the large one is distributed, and the other one if that
+    /// gains more than its messages take. If there are as many equal bodies as ranks, none is distributed. With one
+    /// body too many, one is.
     #[test]
     fn large_bodies_are_distributed() {
         let distributed = |loads: &[usize], ranks| largest(loads, &vec![true; loads.len()], ranks);

@@ -7,9 +7,11 @@ use crate::error::Result;
 use crate::exchange::ASKS;
 use crate::interrupt::{self, ENDING, Interrupt};
 
-/// An observer that saves states and results of a run. All calls are collective. A failure to write does not end the run.
+/// An observer that saves states and results of a run. All calls are collective. A failure to write does not end the
+/// run.
 pub trait Recorder: Observer {
-    /// Save the states from which another process can go on: at the end of a load step, and of a run that a signal ends.
+    /// Save the states from which another process can go on: at the end of a load step, and of a run that a signal
+    /// ends.
     fn state(&mut self, _done: &Done) {}
 
     /// Save the results of a finished load step, the last of `Done::steps`, in the units of the scene, with its bodies.
@@ -19,7 +21,8 @@ pub trait Recorder: Observer {
 impl Recorder for Silent {}
 impl Recorder for Interrupt {}
 
-/// Solve until a rule or a signal ends the run. `full` is whether this is the full load. There the interval of gamma is computed if the scene requests it.
+/// Solve until a rule or a signal ends the run. `full` is whether this is the full load. There the interval of gamma is
+/// computed if the scene requests it.
 pub fn solve(ready: Prepared, full: bool, keep: &mut dyn Recorder) -> Result<Done> {
     let Prepared { mut built, mut method, start, steps, earlier, warnings } = ready;
     let wants_interval = built.scene.method.interval && full;

@@ -115,7 +115,8 @@ fn add_counters(report: &mut Report, shared: &GatheredCounters, outcome: &Outcom
     };
 }
 
-/// Return the part of the report that is known before the first sweep. `solvers` are the inner solvers of the bodies in words.
+/// Return the part of the report that is known before the first sweep. `solvers` are the inner solvers of the bodies in
+/// words.
 pub fn headline(session: &Session, built: &Built, solvers: &[String], clock: &Clock) -> Report {
     let Built { scene, discrete: Discrete { bodies, .. }, .. } = built;
     Report {
@@ -162,7 +163,8 @@ fn petsc_options(session: &Session) -> Vec<String> {
     session.options().typed().into_iter().map(option).collect()
 }
 
-/// Data that only the owners of the bodies have, gathered on every rank: counters over all bodies, and their inner solvers.
+/// Data that only the owners of the bodies have, gathered on every rank: counters over all bodies, and their inner
+/// solvers.
 #[derive(Default, Serialize, Deserialize)]
 pub struct GatheredCounters {
     /// Counters, summed over all bodies.
@@ -173,7 +175,8 @@ pub struct GatheredCounters {
     pub solvers: Vec<String>,
 }
 
-/// Return the inner solvers of the bodies in words: each solver once, with the number of its bodies if it has several but not all.
+/// Return the inner solvers of the bodies in words: each solver once, with the number of its bodies if it has several
+/// but not all.
 pub fn solvers_in_words(solvers: &[String]) -> String {
     let mut kinds: Vec<(&str, usize)> = Vec::new();
     for solver in solvers {
@@ -288,8 +291,9 @@ pub fn contact_table(done: &Done, estimate: Option<&Estimate>, i: usize) -> Cont
     }
 }
 
-/// Return the displacement at the points of the surface of each pair, on the first rank, and none on the others. The points of a distributed body are
-/// known by their coordinates; NaN where the displacement of the body is not known. Collective.
+/// Return the displacement at the points of the surface of each pair, on the first rank, and none on the others. The
+/// points of a distributed body are known by their coordinates; NaN where the displacement of the body is not known.
+/// Collective.
 ///
 /// # Errors
 /// A message that cannot be read.
@@ -320,8 +324,8 @@ pub fn surface_displacements(done: &Done, recovered: &All) -> Result<Vec<Vec<[f6
     Ok(displacement)
 }
 
-/// Return the surface of pair `i` with gap, compression, pressure, normal (from side a to side b) and area (length) of the points, and with the
-/// `displacement` of side a.
+/// Return the surface of pair `i` with gap, compression, pressure, normal (from side a to side b) and area (length) of
+/// the points, and with the `displacement` of side a.
 pub fn contact_surface(name: &str, done: &Done, i: usize, displacement: &[[f64; 3]]) -> UnstructuredGrid {
     let (model, layer) = (done.model(), &done.outcome.layer);
     let (pair, range) = (&model.pairs[i], model.range(i));

@@ -1,5 +1,5 @@
-//! Results from the displacements of the bodies: largest stresses and strains with their positions, errors against a known solution, forces,
-//! approach and contact size of each pair, and reactions and balance of each body.
+//! Results from the displacements of the bodies: largest stresses and strains with their positions, errors against a
+//! known solution, forces, approach and contact size of each pair, and reactions and balance of each body.
 
 use super::stages::{All, Built, Done, Recovered};
 use super::{extent, numbered};
@@ -20,8 +20,8 @@ use crate::problem::history::History;
 use serde::{Deserialize, Serialize};
 use std::rc::Rc;
 
-/// Return the displacements of the bodies that this rank has nodes of. They are recovered unless the end of the run stored them.
-/// Collective.
+/// Return the displacements of the bodies that this rank has nodes of. They are recovered unless the end of the run
+/// stored them. Collective.
 pub fn recover(done: &Done) -> Rc<All> {
     done.recovered.clone().unwrap_or_else(|| {
         let local = |(index, slot): (usize, &BodySlot)| {
@@ -35,7 +35,8 @@ pub fn recover(done: &Done) -> Rc<All> {
 fn recover_body(slot: &BodySlot, body: &Body, iterate: &Field, index: usize) -> Result<Recovered> {
     let (bent, amounts) = (&iterate.displacements[index], &iterate.rigid[index]);
     let state = body.recover(&body.dofs().join(bent, amounts))?;
-    // a motion that springs resist counts as deformation; the amounts are the same on all ranks, so all of them take the same branch
+    // a motion that springs resist counts as deformation; the amounts are the same on all ranks, so all of them take
+    // the same branch
     let is_whole = slot.sprung.is_some() || amounts.iter().all(|a| *a == 0.0);
     let bent = if is_whole { state.clone() } else { body.recover(bent)? };
     Ok(Recovered::new(state, bent))
@@ -128,16 +129,16 @@ impl Extremes {
     }
 }
 
-/// Angle of the mean rotation of a body up to which displacements are small. A turn by it moves points across by a thousandth of their
-/// distance, and the normal of a surface by itself.
+/// Angle of the mean rotation of a body up to which displacements are small. A turn by it moves points across by a
+/// thousandth of their distance, and the normal of a surface by itself.
 const TURNED: f64 = 0.05;
 
-/// Displacements up to this fraction of the size of a body are small. A rotation by this angle changes lengths along and across by
-/// half a per cent.
+/// Displacements up to this fraction of the size of a body are small. A rotation by this angle changes lengths along
+/// and across by half a per cent.
 const SMALL: f64 = 0.1;
 
-/// Write largest stresses, displacements and errors of all bodies to their reports, null where there are none. Return warnings of
-/// displacements and strains that are too large for the theory. Collective.
+/// Write largest stresses, displacements and errors of all bodies to their reports, null where there are none. Return
+/// warnings of displacements and strains that are too large for the theory. Collective.
 pub fn fill(discrete: &Discrete, recovered: &All, reports: &mut [BodyReport]) -> Vec<String> {
     let (mut moved, mut turned, mut strained) = (Vec::new(), Vec::new(), Vec::new());
     for (report, extremes) in reports.iter_mut().zip(gather(discrete, recovered)) {
@@ -194,8 +195,8 @@ fn gather(discrete: &Discrete, recovered: &All) -> Vec<Option<Extremes>> {
     all
 }
 
-/// Return the largest strain of a body in words, with its position and the fraction of the body with large strains. Near a sharp
-/// corner these are a few cells.
+/// Return the largest strain of a body in words, with its position and the fraction of the body with large strains.
+/// Near a sharp corner these are a few cells.
 fn strain_in_words(name: &str, strain: &Strained) -> String {
     let [large, all] = strain.measure;
     let [x, y, z] = strain.at.map(|x| readable(x, 4));
@@ -242,7 +243,8 @@ pub fn reported(bodies: &[BodyReport]) -> Vec<ReactionReport> {
     reactions(bodies.iter().map(|body| (&body.name, body.balance.clone())))
 }
 
-/// Return the report of the load step `number` of a history, counted from 0, which has ended with these displacements. Collective.
+/// Return the report of the load step `number` of a history, counted from 0, which has ended with these displacements.
+/// Collective.
 pub fn step(
     done: &Done,
     recovered: &All,
@@ -267,8 +269,8 @@ pub fn step(
     }
 }
 
-/// Return the resultant force or moment of contact forces (n) on a side: minus the sum of the forces times the `rows` (n x 3) of their
-/// points.
+/// Return the resultant force or moment of contact forces (n) on a side: minus the sum of the forces times the `rows`
+/// (n x 3) of their points.
 pub fn resultant(force: &[f64], rows: &[[f64; 3]]) -> [f64; 3] {
     std::array::from_fn(|k| force.iter().zip(rows).fold(0.0, |sum, (force, row)| sum - force * row[k]))
 }
@@ -341,7 +343,8 @@ pub fn offset(done: &Done, i: usize) -> Option<f64> {
     Some(model.pairs[i].offset + closing[0])
 }
 
-/// Return the approach of the bodies of each pair along its mean normal, none without a mean normal. Collective, one message.
+/// Return the approach of the bodies of each pair along its mean normal, none without a mean normal. Collective, one
+/// message.
 pub fn approaches(done: &Done, recovered: &All) -> Vec<Option<f64>> {
     let (discrete, model) = (&done.built.discrete, done.model());
     let mut sums = vec![0.0; model.pairs.len()];
@@ -404,7 +407,8 @@ fn add_forces(done: &Done, body: usize, recovered: &Recovered, mine: &mut [f64])
     mine.iter_mut().zip(numbers).for_each(|(mine, number)| *mine = number);
 }
 
-/// Return the report of the forces on a body from the numbers of its resultants, and the sums of sizes of forces and moments.
+/// Return the report of the forces on a body from the numbers of its resultants, and the sums of sizes of forces and
+/// moments.
 fn balance(info: &BodyInfo, numbers: &[f64]) -> BalanceReport {
     let names = names(info);
     let (resultants, sizes) = numbers.split_at(WIDTH * names.len());
@@ -424,7 +428,8 @@ fn balance(info: &BodyInfo, numbers: &[f64]) -> BalanceReport {
     BalanceReport { loads, contacts, supports, springs, rigid, force_imbalance, moment_imbalance }
 }
 
-/// Return the norm of the sum of vectors, relative to the sum of the sizes of all nodal contributions; zero if that is zero.
+/// Return the norm of the sum of vectors, relative to the sum of the sizes of all nodal contributions; zero if that is
+/// zero.
 fn imbalance(vectors: impl Iterator<Item = [f64; 3]> + Clone, size: f64) -> f64 {
     let sum = |c: usize| vectors.clone().map(|vector| vector[c]).sum::<f64>();
     if size > 0.0 { length([0, 1, 2].map(sum)) / size } else { 0.0 }

@@ -1,4 +1,5 @@
-//! The stages of a run, each made from the previous one: [`Scene`], [`Built`], [`Prepared`], [`Done`]; and the clock that measures its phases.
+//! The stages of a run, each made from the previous one: [`Scene`], [`Built`], [`Prepared`], [`Done`]; and the clock
+//! that measures its phases.
 
 use super::inner::Solvers;
 use super::meshed::{MeshFile, SceneMesh};
@@ -146,7 +147,8 @@ impl Recovered {
     }
 }
 
-/// The displacements of every body: none for bodies of other ranks, or the failure of the solver that recovers the interior.
+/// The displacements of every body: none for bodies of other ranks, or the failure of the solver that recovers the
+/// interior.
 pub type All = Vec<Option<Result<Recovered>>>;
 
 /// The clock of a run, which measures its phases.
@@ -156,11 +158,13 @@ pub struct Clock {
     last: Instant,
     /// Wall seconds by phase.
     pub times: BTreeMap<String, f64>,
-    /// Peak resident memory of this process at the end of each phase, 10^6 bytes; empty where the system does not report it.
+    /// Peak resident memory of this process at the end of each phase, 10^6 bytes; empty where the system does not
+    /// report it.
     pub memory: BTreeMap<String, f64>,
     /// Estimated seconds of set-up and iteration, if the choice of the solvers made an estimate.
     pub estimate: Option<f64>,
-    /// Function that is called at the end of each phase with its name, and at the beginning of the first with an empty name.
+    /// Function that is called at the end of each phase with its name, and at the beginning of the first with an empty
+    /// name.
     pub watch: Option<Rc<Watch>>,
 }
 

@@ -21,23 +21,25 @@ use std::rc::Rc;
 /// PETSc fails. A run that does not converge is not an error but a status of the outcome.
 pub fn iterate(ready: Prepared, interrupt: &Interrupt, keep: &mut dyn Recorder, clock: &mut Clock) -> Result<Done> {
     interrupt.hold();
-    let mut done = match ready.built.scene.method.steps.is_empty() {
-        true => recorder::solve(ready, true, keep).inspect(|done| {
+    let mut done = if ready.built.scene.method.steps.is_empty() {
+        recorder::solve(ready, true, keep).inspect(|done| {
             if matches!(done.outcome.status, Status::Interrupted { .. }) {
                 keep.state(done);
             }
-        }),
-        false => steps(ready, keep, clock),
+        })
+    } else {
+        steps(ready, keep, clock)
     }?;
     warnings::note_ends(&mut done);
     clock.phase("iterate");
     Ok(done)
 }
 
-/// Solve the load steps of a scene and report each. The outcome is that of the last step with the counters and rows of all steps.
+/// Solve the load steps of a scene and report each. The outcome is that of the last step with the counters and rows of
+/// all steps.
 ///
-/// After a step without a usable result, the next step begins with the start of the scene. A step that a signal interrupts is the
-/// last.
+/// After a step without a usable result, the next step begins with the start of the scene. A step that a signal
+/// interrupts is the last.
 ///
 /// # Errors
 /// Failures of the solver library, and loads that a body cannot have.

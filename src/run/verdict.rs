@@ -139,12 +139,15 @@ fn unbounded(moving: &[NamedMotion], model: &Model) -> String {
     )
 }
 
-/// Relative error up to which the message on an inaccurate result tells how to accept it: that of a result with three digits.
+/// Relative error up to which the message on an inaccurate result tells how to accept it: that of a result with three
+/// digits.
 const ACCEPTABLE: f64 = 1e-3;
 
-/// Return the message on a result whose forces lack balance by the relative error `found`, where the run saw the error `reported`.
+/// Return the message on a result whose forces lack balance by the relative error `found`, where the run saw the error
+/// `reported`.
 fn inaccurate(found: f64, reported: f64) -> String {
-    // a body with few digits, such as a slender one under a force that is tiny beside the others, has such an error with any solver
+    // a body with few digits, such as a slender one under a force that is tiny beside the others, has such an error
+    // with any solver
     let accept = if found < ACCEPTABLE {
         format!(", or accept it (--set method.stop.residual={})", sci(found, 0))
     } else {
@@ -187,7 +190,8 @@ pub fn is_solved(step: &StepReport) -> bool {
 /// Statuses of load steps without a solution, from those whose last iterate is nearest to one on; others are worse.
 const UNSOLVED: [&str; 4] = ["inaccurate", "stagnated", "iteration-limit", "interrupted"];
 
-/// Return status and message of the worst load step before the last one, if it found no solution and is worse than the last one.
+/// Return status and message of the worst load step before the last one, if it found no solution and is worse than the
+/// last one.
 pub fn worst_step(steps: &[StepReport]) -> Option<(String, String)> {
     let badness = |step: &StepReport| match UNSOLVED.iter().position(|status| *status == step.status) {
         _ if is_solved(step) => 0,
@@ -206,7 +210,8 @@ pub fn worst_step(steps: &[StepReport]) -> Option<(String, String)> {
     Some((before[number].status.clone(), message))
 }
 
-/// Return warnings of the load steps before the last one that found no solution, and of later ones that keep what they have found.
+/// Return warnings of the load steps before the last one that found no solution, and of later ones that keep what they
+/// have found.
 pub fn step_warnings(done: &Done) -> Vec<String> {
     let (steps, history) = (&done.steps, &done.built.scene.method.steps);
     let before = steps.iter().take(steps.len().saturating_sub(1)).enumerate();

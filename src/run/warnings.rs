@@ -1,5 +1,5 @@
-//! The warnings of a run: on the problem and its mesh, on surfaces without a partner, on edges and facets, on the ends of layers and pairs, and on
-//! estimates that are guesses.
+//! The warnings of a run: on the problem and its mesh, on surfaces without a partner, on edges and facets, on the ends
+//! of layers and pairs, and on estimates that are guesses.
 
 use super::in_words;
 use super::results;
@@ -66,7 +66,8 @@ fn of_mechanisms(discrete: &Discrete) -> Vec<String> {
     found.iter().map(|(mechanism, bodies)| mechanism_in_words(discrete, mechanism, bodies)).collect()
 }
 
-/// Return the warning of a motion that nothing resists. It is one of these bodies together if it names them, and one that each of them has if not.
+/// Return the warning of a motion that nothing resists. It is one of these bodies together if it names them, and one
+/// that each of them has if not.
 fn mechanism_in_words(discrete: &Discrete, mechanism: &Mechanism, bodies: &[usize]) -> String {
     let Mechanism { motion, work, balanced, fixed, .. } = mechanism;
     let name = |body: usize| &discrete.bodies[body].name;
@@ -95,7 +96,8 @@ fn mechanism_in_words(discrete: &Discrete, mechanism: &Mechanism, bodies: &[usiz
     format!("{who}: nothing holds {whose} {motion}, and {loads}{then} {end}")
 }
 
-/// Return the warning of the force that a node carries at which a body is fixed, if it is more than the relative error of the result.
+/// Return the warning of the force that a node carries at which a body is fixed, if it is more than the relative error
+/// of the result.
 pub fn of_fixed(name: &str, balance: &BalanceReport, error: f64) -> Option<String> {
     let others = balance.supports.iter().chain(&balance.springs).chain(&balance.rigid);
     let all = [&balance.loads, &balance.contacts].into_iter().chain(others);
@@ -157,8 +159,9 @@ fn of_surfaces(pairs: &[ContactPair], specs: &[ContactSpec]) -> Vec<String> {
     warnings
 }
 
-/// Return the warning of facets that `angle` or `distance` leaves without a partner, and at which the contact of pair `i` ends under pressure. Where a
-/// surface turns away from the other one without pressure, or goes on beyond it, such facets are usual, and `check` counts them.
+/// Return the warning of facets that `angle` or `distance` leaves without a partner, and at which the contact of pair
+/// `i` ends under pressure. Where a surface turns away from the other one without pressure, or goes on beyond it, such
+/// facets are usual, and `check` counts them.
 pub fn cut_short(done: &Done, i: usize) -> Option<String> {
     let (pair, spec) = (&done.model().pairs[i], &done.built.discrete.specs[i]);
     let pressure = &done.outcome.layer.pressure[done.model().range(i)];
@@ -175,11 +178,13 @@ pub fn cut_short(done: &Done, i: usize) -> Option<String> {
     })
 }
 
-/// Least change of the pressures by the height of curved surfaces above straight facets that is worth a warning. The height is that of parabolas
-/// and the bodies yield to it about as much as to the pressures, so that the change itself is known to a half of it.
+/// Least change of the pressures by the height of curved surfaces above straight facets that is worth a warning. The
+/// height is that of parabolas and the bodies yield to it about as much as to the pressures, so that the change itself
+/// is known to a half of it.
 const BY_CHORDS: f64 = 0.1;
 
-/// Return the warning for pair `i`, if its pressures would be others on the curved surfaces whose chords its facets are.
+/// Return the warning for pair `i`, if its pressures would be others on the curved surfaces whose chords its facets
+/// are.
 ///
 /// The heights h of the surfaces above their facets close the gap, be it drawn as a clearance, as an overlap or as nothing. A point with the
 /// compression c and the pressure p then has the pressure where the law meets the line c + h + s p, with the compliance s of the bodies to a wave as
@@ -203,13 +208,15 @@ pub fn by_chords(done: &Done, i: usize) -> Option<String> {
         return None;
     }
     let [least, most] = linalg::range(pair.gap.iter().copied());
-    let drawn = match least < 0.0 {
-        true => format!("the overlap is {} at most", sci(-least, 2)),
-        false => format!("the gap is {} to {}", sci(least, 2), sci(most, 2)),
+    let drawn = if least < 0.0 {
+        format!("the overlap is {} at most", sci(-least, 2))
+    } else {
+        format!("the gap is {} to {}", sci(least, 2), sci(most, 2))
     };
-    let change = match whole > 0.0 {
-        true => format!("would change by about {:.0} % on these", 100.0 * f64::sqrt(changed / whole)),
-        false => "would not vanish on these".to_owned(),
+    let change = if whole > 0.0 {
+        format!("would change by about {:.0} % on these", 100.0 * f64::sqrt(changed / whole))
+    } else {
+        "would not vanish on these".to_owned()
     };
     let [a, b] = names(&done.built.discrete.specs[i]);
     Some(format!(
@@ -234,8 +241,9 @@ fn lost(pair: &ContactPair, spec: &ContactSpec) -> Option<String> {
     })
 }
 
-/// Return the warnings for pair `i`, if its layer is compressed or stretched beyond the end of its law, at the solution or in a load step. There the
-/// law is extrapolated by a straight line from the end of a table, or of an expression with `up_to`, without measured data.
+/// Return the warnings for pair `i`, if its layer is compressed or stretched beyond the end of its law, at the solution
+/// or in a load step. There the law is extrapolated by a straight line from the end of a table, or of an expression
+/// with `up_to`, without measured data.
 pub fn beyond_law(done: &Done, i: usize) -> Vec<String> {
     let pair = &done.model().pairs[i];
     let least = |end: &dyn Fn(usize) -> f64| (0..pair.len()).map(end).fold(f64::INFINITY, f64::min);
@@ -259,11 +267,12 @@ pub fn beyond_law(done: &Done, i: usize) -> Vec<String> {
     warnings
 }
 
-/// Change of the force along the normal, as a share, from which it is worth a warning that the normals of both sides differ. A normal that is
-/// inclined by the angle t changes the force by t^2/2: one per cent belongs to 8 degrees.
+/// Change of the force along the normal, as a share, from which it is worth a warning that the normals of both sides
+/// differ. A normal that is inclined by the angle t changes the force by t^2/2: one per cent belongs to 8 degrees.
 const TILTED: f64 = 0.01;
 
-/// Return the warning for pair `i`, if the normals of its sides differ under pressure by more than small displacements allow.
+/// Return the warning for pair `i`, if the normals of its sides differ under pressure by more than small displacements
+/// allow.
 pub fn tilted(done: &Done, i: usize) -> Option<String> {
     let (pair, pressure) = (&done.model().pairs[i], &done.outcome.layer.pressure[done.model().range(i)]);
     let force = |q: usize| pair.area[q] * pressure[q];
@@ -282,8 +291,9 @@ pub fn tilted(done: &Done, i: usize) -> Option<String> {
     })
 }
 
-/// Return the warning for pair `i`, if the gap of an obstacle is steep under pressure. The obstacle's true normal is inclined to that of the surface by
-/// the slope s of the gap, and its force s p along the surface is neglected. The limit is that of [`TILTED`].
+/// Return the warning for pair `i`, if the gap of an obstacle is steep under pressure. The obstacle's true normal is
+/// inclined to that of the surface by the slope s of the gap, and its force s p along the surface is neglected. The
+/// limit is that of [`TILTED`].
 pub fn steep_gap(done: &Done, i: usize) -> Option<String> {
     let (discrete, pair) = (&done.built.discrete, &done.model().pairs[i]);
     let pressure = &done.outcome.layer.pressure[done.model().range(i)];
@@ -305,7 +315,8 @@ pub fn steep_gap(done: &Done, i: usize) -> Option<String> {
     })
 }
 
-/// Return the warning that no pair carries a pressure, at the solution or in a load step. Then contact has no part in the results.
+/// Return the warning that no pair carries a pressure, at the solution or in a load step. Then contact has no part in
+/// the results.
 pub fn nothing_touches(done: &Done) -> Option<String> {
     let pairs = 0..done.model().pairs.len();
     if pairs.clone().any(|i| done.model().pairs[i].law.is_bonded()) {
@@ -339,7 +350,8 @@ fn most_stretched(done: &Done, i: usize) -> Option<Largest> {
     largest(done, i, |pair| pair.tension.map(|tension| [tension.peak_stretch, tension.peak_tension]))
 }
 
-/// Return the largest of what `of` takes from the reports of a pair over all solutions of a run: a compression and a pressure.
+/// Return the largest of what `of` takes from the reports of a pair over all solutions of a run: a compression and a
+/// pressure.
 fn largest(done: &Done, i: usize, of: fn(&StepPairReport) -> Option<[f64; 2]>) -> Option<Largest> {
     let found = |pair: &StepPairReport, step| of(pair).map(|[most, pressure]| Largest { most, pressure, step });
     if done.steps.is_empty() {
@@ -351,8 +363,8 @@ fn largest(done: &Done, i: usize, of: fn(&StepPairReport) -> Option<[f64; 2]>) -
     all.max_by(|a, b| a.most.total_cmp(&b.most))
 }
 
-/// Add the warnings of contacts that reach the end of a pair, which the key `distance` has cut short. A pair has one warning, that of the first load
-/// step.
+/// Add the warnings of contacts that reach the end of a pair, which the key `distance` has cut short. A pair has one
+/// warning, that of the first load step.
 pub fn note_ends(done: &mut Done) {
     if !done.outcome.status.is_solved() {
         return;
@@ -377,17 +389,19 @@ pub fn note_ends(done: &mut Done) {
     }
 }
 
-/// Approach of the surfaces, as a share of the largest distance of a pair, from which a contact at the end of the pair goes on beyond it.
+/// Approach of the surfaces, as a share of the largest distance of a pair, from which a contact at the end of the pair
+/// goes on beyond it.
 ///
-/// On a curved surface the distance at an end is nearly the largest one. It grows with the square of the place r, and the end is within a facet
-/// of size h from the largest distance: its share is (r/(r + h))^2 or more, which is a half if r is 2.4 facets. So every contact of three facets
-/// that reaches the end counts. At a step of the surface the distance at the end is less, and the surfaces have to approach by all of the step,
-/// which is more than the largest distance, until what lies beyond touches. Spheres whose contact ends where they are 0.02 apart are
-/// found with largest distances from 0.004 to 0.016, on elements of both orders (`tests/geometry/ends.rs`).
+/// On a curved surface the distance at an end is nearly the largest one. It grows with the square of the place r, and
+/// the end is within a facet of size h from the largest distance: its share is (r/(r + h))^2 or more, which is a half
+/// if r is 2.4 facets. So every contact of three facets that reaches the end counts. At a step of the surface the
+/// distance at the end is less, and the surfaces have to approach by all of the step, which is more than the largest
+/// distance, until what lies beyond touches. Spheres whose contact ends where they are 0.02 apart are found with
+/// largest distances from 0.004 to 0.016, on elements of both orders (`tests/geometry/ends.rs`).
 const NEARLY: f64 = 0.5;
 
-/// Return the number of contact points under pressure from which the contact probably goes on beyond the end of pair `i`. Surfaces that touch
-/// whatever their distance is have no approach: there every such point counts.
+/// Return the number of contact points under pressure from which the contact probably goes on beyond the end of pair
+/// `i`. Surfaces that touch whatever their distance is have no approach: there every such point counts.
 fn reached(done: &Done, i: usize) -> usize {
     let (layer, first) = (&done.outcome.layer, done.model().range(i).start);
     let (discrete, gap) = (&done.built.discrete, &done.model().pairs[i].gap);

@@ -1,8 +1,10 @@
-//! Keys and values of scenes, commands and options that earlier versions or other programs know, each with what to use instead.
+//! Keys and values of scenes, commands and options that earlier versions or other programs know, each with what to use
+//! instead.
 
 use crate::error::Error;
 
-/// Names that are gone, or stand for what is not computed: a key or a word that was the value of a key: the name, what its place in the scene is called, and the advice.
+/// Names that are gone, or stand for what is not computed: a key or a word that was the value of a key: the name, what
+/// its place in the scene is called, and the advice.
 const KEYS: &[(&str, &str, &str)] = &[
     ("anderson", "method", SWEEPS),
     ("asperities", "layer", "scripts/library/asperities.py prints their law: layer = { table = [...] }"),

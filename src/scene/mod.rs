@@ -1,7 +1,8 @@
 //! Scene files: from TOML to a checked [`Scene`]. Every refusal names file and line, and says what to do.
 //!
-//! [`load`] parses the file into a table with spans, puts the options of the command line into it (`overrides`), and lets serde read the [`Scene`]
-//! from it. What serde refuses is put into words by `refuse`. The scene, whether it is read or built in Rust, is checked by [`Scene::verify`].
+//! [`load`] parses the file into a table with spans, puts the options of the command line into it (`overrides`), and
+//! lets serde read the [`Scene`] from it. What serde refuses is put into words by `refuse`. The scene, whether it is
+//! read or built in Rust, is checked by [`Scene::verify`].
 
 pub mod gone;
 mod overrides;
@@ -27,8 +28,8 @@ use std::sync::Arc;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// Read and check a scene file, after applying `overrides` in their order: `KEY=VALUE` as given to `--set`, or options that are short for
-/// it. The mesh file must exist; it is not read.
+/// Read and check a scene file, after applying `overrides` in their order: `KEY=VALUE` as given to `--set`, or options
+/// that are short for it. The mesh file must exist; it is not read.
 ///
 /// # Errors
 /// Refusals point at the text of the scene or of the override. A file that cannot be read is [`Kind::File`].
@@ -130,10 +131,7 @@ pub fn text(path: &Path) -> Result<String> {
     if path.is_dir() {
         let error = Error::new(Kind::File, format!("{} is a folder, not a scene file", path.display()));
         let inside = path.join("scene.toml");
-        return Err(match inside.is_file() {
-            true => error.help(format!("did you mean {}?", inside.display())),
-            false => error,
-        });
+        return Err(if inside.is_file() { error.help(format!("did you mean {}?", inside.display())) } else { error });
     }
     let bytes = crate::file::read(path).map_err(|error| match path.try_exists() {
         Ok(false) => {

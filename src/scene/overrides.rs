@@ -1,8 +1,8 @@
 //! Options of the command line that change a scene.
 //!
-//! An override is `KEY=VALUE`, or an option that is short for one. KEY is a dotted path. Items of lists are numbered from 0
-//! (`contact.0.layer.power.a`); a table with a name also goes by its name (`body.upper.order`). VALUE is TOML, or a bare text. Spans of new keys
-//! and values lie in the text of the option, so that later refusals point there.
+//! An override is `KEY=VALUE`, or an option that is short for one. KEY is a dotted path. Items of lists are numbered
+//! from 0 (`contact.0.layer.power.a`); a table with a name also goes by its name (`body.upper.order`). VALUE is TOML,
+//! or a bare text. Spans of new keys and values lie in the text of the option, so that later refusals point there.
 
 use super::refuse::syntax;
 use crate::error::{Error, Kind, Place, Result, Source, few};
@@ -19,7 +19,8 @@ const SHORT: [(&str, &str); 2] = [("--method", "method.name"), ("--tolerance", "
 const FLAGS: [(&str, &str); 4] =
     [("--estimate", "estimate"), ("--vtu", "output.vtu"), ("--msh", "output.msh"), ("--report", "output.report")];
 
-/// An option as typed, which is `KEY=VALUE` or an option with its value (`--over KEY=VALUE`, `--tolerance 1e-3`, `--vtu`).
+/// An option as typed, which is `KEY=VALUE` or an option with its value (`--over KEY=VALUE`, `--tolerance 1e-3`,
+/// `--vtu`).
 pub struct Typed {
     source: Arc<Source>,
     /// Where its spans begin among those of the scene.
@@ -169,15 +170,17 @@ impl Typed {
     fn index(&self, items: &[Value<'_>], step: &Step<'_>) -> Result<usize> {
         let Step { name, span, parent, .. } = step;
         let name_of = |item| -> Option<&str> { Value::get_ref(item).get("name")?.get_ref().as_str() };
-        let found = match is_number(name) {
-            true => name.parse().ok().filter(|index| *index < items.len()),
-            false => items.iter().position(|item| name_of(item) == Some(name)),
+        let found = if is_number(name) {
+            name.parse().ok().filter(|index| *index < items.len())
+        } else {
+            items.iter().position(|item| name_of(item) == Some(name))
         };
         found.ok_or_else(|| {
             let count = format!("{} item{}", items.len(), if items.len() == 1 { "" } else { "s" });
-            let message = match is_number(name) {
-                true => format!("`{parent}` has {count}, there is no number {name}"),
-                false => format!("`{parent}` is a list of {count}; `{name}` is no number"),
+            let message = if is_number(name) {
+                format!("`{parent}` has {count}, there is no number {name}")
+            } else {
+                format!("`{parent}` is a list of {count}; `{name}` is no number")
             };
             let error = Error::scene(&self.place(span.clone()), message);
             let known: Vec<&str> = items.iter().filter_map(name_of).collect();

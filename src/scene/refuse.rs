@@ -1,5 +1,5 @@
-//! What the toml crate and serde refuse, put into words for a user: the place, what is wrong there, and what to do about it. Descriptions of keys are
-//! those of the JSON schema.
+//! What the toml crate and serde refuse, put into words for a user: the place, what is wrong there, and what to do
+//! about it. Descriptions of keys are those of the JSON schema.
 
 use super::spec::schema;
 use crate::error::{Error, Result, Source, nearest};
@@ -11,7 +11,8 @@ use std::sync::Arc;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, Deserializer};
 
-/// Turn an error of the `toml` crate into a refusal, with advice for common slips. Its spans begin at byte `offset` of the source.
+/// Turn an error of the `toml` crate into a refusal, with advice for common slips. Its spans begin at byte `offset` of
+/// the source.
 pub fn syntax(source: &Arc<Source>, offset: usize, error: &toml::de::Error) -> Error {
     let span = error.span().unwrap_or(0..0);
     let mut one = Sources::default();
@@ -118,7 +119,8 @@ impl<'t, 'i> Found<'t, 'i> {
         Self { node, path: Vec::new() }
     }
 
-    /// Find the value that has a span, or whose key has it. A list that is written `[[body]]` has the span of an item; `innermost` asks for the item.
+    /// Find the value that has a span, or whose key has it. A list that is written `[[body]]` has the span of an item;
+    /// `innermost` asks for the item.
     fn of(node: &'t Spanned<DeValue<'i>>, span: &Range<usize>, innermost: bool) -> Option<Self> {
         let own = || (node.span() == *span).then(|| Self::root(node));
         let below = || match node.get_ref() {
@@ -245,7 +247,8 @@ fn forms(schema: &Json) -> Vec<&Json> {
     std::iter::once(schema).chain(inner).collect()
 }
 
-/// Return the span of the first list that stands where a table belongs. serde would take its items for the values of the keys, in their order.
+/// Return the span of the first list that stands where a table belongs. serde would take its items for the values of
+/// the keys, in their order.
 fn list_for_table(node: &Spanned<DeValue<'_>>, schemas: &[&Json]) -> Option<Range<usize>> {
     match node.get_ref() {
         DeValue::Array(_) if !schemas.is_empty() && schemas.iter().all(|schema| schema.get("items").is_none()) => {

@@ -49,7 +49,8 @@ pub struct Scene {
     pub data: Library,
     /// a body starts with the line [[body]]
     ///
-    /// The tables of bodies, in the order of the file. The name of a body may be a pattern, and so may the names of groups.
+    /// The tables of bodies, in the order of the file. The name of a body may be a pattern, and so may the names of
+    /// groups.
     #[serde(rename = "body", deserialize_with = "all")]
     pub bodies: Vec<BodySpec>,
     /// a contact starts with the line [[contact]]
@@ -231,8 +232,8 @@ impl Serialize for Most {
 }
 
 impl Scene {
-    /// Return a scene without bodies, in the plane (`dimension` 2, plane strain) or in space (3), solved by Newton's method. Settings
-    /// without a method of their own are fields of the scene.
+    /// Return a scene without bodies, in the plane (`dimension` 2, plane strain) or in space (3), solved by Newton's
+    /// method. Settings without a method of their own are fields of the scene.
     #[track_caller]
     pub fn new(dimension: usize, mesh: impl Into<MeshSource>) -> Self {
         let place = Place::here(&dimension.to_string());
@@ -284,16 +285,16 @@ impl Scene {
         Self { method, ..self }
     }
 
-    /// Add a law of a layer, which [`LayerSpec::Own`](crate::problem::layer::LayerSpec::Own) uses by its name. `maker` gets the contact
-    /// points (x, y, z) of a pair and returns the law for all of them. The law is checked at the first point: it must increase, and its
-    /// energy must be the integral of its pressure.
+    /// Add a law of a layer, which [`LayerSpec::Own`](crate::problem::layer::LayerSpec::Own) uses by its name. `maker`
+    /// gets the contact points (x, y, z) of a pair and returns the law for all of them. The law is checked at the first
+    /// point: it must increase, and its energy must be the integral of its pressure.
     pub fn law<L: LayerLaw + 'static>(mut self, name: &str, maker: impl Fn(&[[f64; 3]]) -> L + 'static) -> Self {
         self.laws.insert(name, Rc::new(move |points: &[[f64; 3]]| Box::new(maker(points)) as _));
         self
     }
 
-    /// Add a rule for gamma, which [`Gamma::Own`](crate::problem::method::Gamma::Own) uses by its name. `maker` returns a new rule for
-    /// each run.
+    /// Add a rule for gamma, which [`Gamma::Own`](crate::problem::method::Gamma::Own) uses by its name. `maker` returns
+    /// a new rule for each run.
     pub fn rule<R: GammaRule + 'static>(mut self, name: &str, maker: impl Fn() -> R + 'static) -> Self {
         self.own_rules.insert(name, Rc::new(move || Box::new(maker()) as _));
         self
@@ -379,10 +380,11 @@ impl Scene {
         Geometry { dimension: self.dimension.value, plane: self.plane }
     }
 
-    /// Return the scene as JSON, keyed like the scene file, with every default written out. Keys that have no default and were not given
-    /// are left out. Expressions are texts.
+    /// Return the scene as JSON, keyed like the scene file, with every default written out. Keys that have no default
+    /// and were not given are left out. Expressions are texts.
     ///
-    /// A key that is missing here is also ignored where scenes are compared: by a restart, in a sweep, and between ranks.
+    /// A key that is missing here is also ignored where scenes are compared: by a restart, in a sweep, and between
+    /// ranks.
     pub fn settings(&self) -> Json {
         let context = Context { geometry: self.geometry(), ..Context::default() };
         let mut settings = within(context, || serde_json::to_value(self)).unwrap_or_default();
@@ -394,8 +396,9 @@ impl Scene {
         settings
     }
 
-    /// Return the settings without the names of files and folders. The name of each data file is replaced by a digest of its numbers;
-    /// the settings have the numbers of tables themselves. The contents of the mesh's files are not included.
+    /// Return the settings without the names of files and folders. The name of each data file is replaced by a digest
+    /// of its numbers; the settings have the numbers of tables themselves. The contents of the mesh's files are not
+    /// included.
     pub fn contents(&self) -> Json {
         let mut settings = self.settings();
         remove(&mut settings, "", &["scene"]);

@@ -339,7 +339,8 @@ const CASES: &[Case] = &[
     ("n = 32", "\"n m\" = 32", "\"n m\"", "`n m` is no name of a Gmsh number", ""),
 ];
 
-/// Asserts that a scene with these overrides is refused with a caret under `marked` and these words; returns what is shown.
+/// Asserts that a scene with these overrides is refused with a caret under `marked` and these words; returns what is
+/// shown.
 fn refused(text: &str, overrides: &[&str], change: &str, [marked, message, help]: [&str; 3]) -> String {
     let error = load_text(text, overrides).expect_err(change);
     assert_eq!(error.kind(), Kind::Scene);

@@ -1,8 +1,9 @@
 //! What inner solvers cost: the choice between a factorisation and multigrid for bodies in space.
 //!
-//! Nested dissection of a cube with n dofs takes 19 n^2 operations, a dense contact of R dofs takes R^3/3 in each step, and multigrid takes some
-//! hundred products of K with a vector, whose time is that of reading the entries of K from memory. "The
-//! table" below are 29 scenes of 3564 to 215 622 dofs, cubes, grooves, spheres, flanges and rough faces; docs/solvers.md has some of them.
+//! Nested dissection of a cube with n dofs takes 19 n^2 operations, a dense contact of R dofs takes R^3/3 in each step,
+//! and multigrid takes some hundred products of K with a vector, whose time is that of reading the entries of K from
+//! memory. "The table" below are 29 scenes of 3564 to 215 622 dofs, cubes, grooves, spheres, flanges and rough faces;
+//! docs/solvers.md has some of them.
 
 use super::options::Chosen;
 use crate::linalg::portable::{log2, pow};
@@ -12,27 +13,32 @@ use serde::{Deserialize, Serialize};
 /// Dense operations a second, of two cores with AVX2 or one with AVX-512.
 const RATE: f64 = 2.8e10;
 
-/// Seconds of a product of K with a vector, for each dof: 42 entries in a row of linear elements, 1e9 entries a second. Rows of quadratic elements have twice as
-/// many, but multigrid has a level of their vertices, and takes as long for a dof.
+/// Seconds of a product of K with a vector, for each dof: 42 entries in a row of linear elements, 1e9 entries a second.
+/// Rows of quadratic elements have twice as many, but multigrid has a level of their vertices, and takes as long for a
+/// dof.
 const PRODUCT: f64 = 42.0 / 1e9;
 
-/// Time of a factorisation besides its dense operations, in products with K: finding an order, assembly of fronts, small fronts. Most scenes of the
-/// table took 100 to 400, thin slices less.
+/// Time of a factorisation besides its dense operations, in products with K: finding an order, assembly of fronts,
+/// small fronts. Most scenes of the table took 100 to 400, thin slices less.
 const FACTORED: f64 = 320.0;
 
-/// Time of multigrid from its set-up to the last step of Newton's method, in products with K. The scenes of the table took 690 to 1290 with linear elements
-/// and 380 to 1260 with quadratic ones. Most of that range is the number of iterations, which neither dofs nor shapes of cells predict.
+/// Time of multigrid from its set-up to the last step of Newton's method, in products with K. The scenes of the table
+/// took 690 to 1290 with linear elements and 380 to 1260 with quadratic ones. Most of that range is the number of
+/// iterations, which neither dofs nor shapes of cells predict.
 const MULTIGRID: f64 = 900.0;
 
-/// Steps of Newton's method in a scene; those of the table take 3 to 7. Each has a dense factorisation of all contacts together.
+/// Steps of Newton's method in a scene; those of the table take 3 to 7. Each has a dense factorisation of all contacts
+/// together.
 const NEWTON_STEPS: f64 = 5.0;
 
-/// Bytes of multigrid for a dof: 12 for each entry of G, which is stored in place of K, 12 for hypre's copy, and half a copy for its levels. With quadratic elements
-/// the levels are those of the vertices. For two cubes of 48^3 this gives 890 MB. The run took 1153 MB, with 50 for the process and 180 for mesh, spaces and vectors.
+/// Bytes of multigrid for a dof: 12 for each entry of G, which is stored in place of K, 12 for hypre's copy, and half a
+/// copy for its levels. With quadratic elements the levels are those of the vertices. For two cubes of 48^3 this gives
+/// 890 MB. The run took 1153 MB, with 50 for the process and 180 for mesh, spaces and vectors.
 const LEVELS: f64 = 42.0 * 30.0;
 
-/// Operations of a factorisation with quadratic elements, relative to linear elements with the same number of dofs. A row of the matrix of quadratic elements has
-/// about twice as many entries. Cubes of 12^3 with quadratic elements took 1.2 times as long as cubes of 24^3 with linear elements.
+/// Operations of a factorisation with quadratic elements, relative to linear elements with the same number of dofs. A
+/// row of the matrix of quadratic elements has about twice as many entries. Cubes of 12^3 with quadratic elements took
+/// 1.2 times as long as cubes of 24^3 with linear elements.
 const FILL_P2: f64 = 1.2;
 
 /// A body before it is assembled, in the numbers on which its solver depends.
@@ -57,8 +63,8 @@ pub struct BodyFacts {
     pub options: Chosen,
 }
 
-/// Return the number of cells over that of a cube with as many facets on its boundary, at most one. A cube of n x n x n boxes has 6 n^3 tetrahedra and
-/// 12 n^2 facets; a plate of 1:10 has a compactness of 0.4.
+/// Return the number of cells over that of a cube with as many facets on its boundary, at most one. A cube of n x n x n
+/// boxes has 6 n^3 tetrahedra and 12 n^2 facets; a plate of 1:10 has a compactness of 0.4.
 pub fn compactness(cells: usize, facets: usize) -> f64 {
     let cube = 6.0 * (facets as f64 / 12.0).powf(1.5);
     (cells as f64 / cube).min(1.0)
@@ -73,8 +79,8 @@ pub struct Cost {
     pub bytes: f64,
 }
 
-/// Seconds below which these formulas say little of the time. Set-up and iteration of factored bodies took 0.017 of 0.1 s (`groove3d`), 0.08
-/// of 0.2 s (`sphere-layer`), 0.23 of 0.5 s (`shells`), and 3.1 of 4.5 s (`rough`).
+/// Seconds below which these formulas say little of the time. Set-up and iteration of factored bodies took 0.017 of 0.1
+/// s (`groove3d`), 0.08 of 0.2 s (`sphere-layer`), 0.23 of 0.5 s (`shells`), and 3.1 of 4.5 s (`rough`).
 const BRIEF: f64 = 0.5;
 
 impl Cost {
@@ -93,16 +99,18 @@ impl Cost {
     }
 }
 
-/// Return the costs of both ways to solve for some bodies in space by a method, which may join them in one matrix: of condensed bodies, or of factored ones
-/// where nothing can be condensed, and of conjugate gradients with multigrid. `may_condense` says of each body whether it can be condensed; every
-/// factorisation of another one is of the whole body.
+/// Return the costs of both ways to solve for some bodies in space by a method, which may join them in one matrix: of
+/// condensed bodies, or of factored ones where nothing can be condensed, and of conjugate gradients with multigrid.
+/// `may_condense` says of each body whether it can be condensed; every factorisation of another one is of the whole
+/// body.
 pub fn of_both(
     bodies: &[BodyFacts],
     may_condense: impl Fn(&BodyFacts) -> bool,
     method: MethodName,
     are_joined: bool,
 ) -> [Cost; 2] {
-    // On the first scenes of the table `newton-robin` took 1.0 to 1.9 times as long as with one matrix of all bodies, and `robin` 5.4 to 12 times.
+    // On the first scenes of the table `newton-robin` took 1.0 to 1.9 times as long as with one matrix of all bodies,
+    // and `robin` 5.4 to 12 times.
     let times = match method {
         _ if are_joined => 1.0,
         MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin => 1.2,
@@ -131,8 +139,9 @@ impl BodyFacts {
 
     /// Return the cost of the factorisation by nested dissection.
     ///
-    /// A cube with n dofs takes 19 n^2 operations, measured on blocks of 32 000 to 500 000 dofs, and no body takes more. A plate with m x m columns of k
-    /// nodes is a plane grid of such columns, which takes some 20 m^3 (3 k)^3: the fraction 3.2 k/m of a cube with as many nodes, which is about its compactness.
+    /// A cube with n dofs takes 19 n^2 operations, measured on blocks of 32 000 to 500 000 dofs, and no body takes
+    /// more. A plate with m x m columns of k nodes is a plane grid of such columns, which takes some 20 m^3 (3 k)^3:
+    /// the fraction 3.2 k/m of a cube with as many nodes, which is about its compactness.
     fn factored(&self, is_condensed: bool) -> Cost {
         let n = self.dofs as f64;
         let fill = if self.is_quadratic { FILL_P2 } else { 1.0 };
@@ -143,8 +152,8 @@ impl BodyFacts {
     }
 }
 
-/// Return the estimated bytes of the sparse Cholesky factor of a plane body by nested dissection. They grow as n log n; the constant was
-/// measured on blocks of 32 000 to 500 000 dofs.
+/// Return the estimated bytes of the sparse Cholesky factor of a plane body by nested dissection. They grow as n log n;
+/// the constant was measured on blocks of 32 000 to 500 000 dofs.
 fn plane_factor_bytes(dofs: usize) -> usize {
     let n = dofs as f64;
     (60.0 * n * log2(n + 2.0)) as usize
@@ -155,7 +164,8 @@ fn condensed_bytes(interface: usize) -> usize {
     36 * interface * interface
 }
 
-/// Return the estimated operations of a sparse Cholesky factorisation of a plane body by nested dissection, measured on the same blocks as [`plane_factor_bytes`].
+/// Return the estimated operations of a sparse Cholesky factorisation of a plane body by nested dissection, measured on
+/// the same blocks as [`plane_factor_bytes`].
 pub fn plane_factor_work(dofs: usize) -> f64 {
     56.0 * pow(dofs as f64, 1.5)
 }

@@ -1,11 +1,12 @@
 //! The interface dofs of a body that is condensed to its contact.
 //!
-//! Let R be the interface dofs and I the interior ones, in axes turned to the contact normals. Then S = K_RR - K_RI K_II^-1 K_IR is the
-//! stiffness and g = f_R - K_RI K_II^-1 f_I the load of a body with the same contact rows. Its matrix G = S + B_R' diag(weight) B_R is dense and small.
+//! Let R be the interface dofs and I the interior ones, in axes turned to the contact normals. Then S = K_RR - K_RI
+//! K_II^-1 K_IR is the stiffness and g = f_R - K_RI K_II^-1 f_I the load of a body with the same contact rows. Its
+//! matrix G = S + B_R' diag(weight) B_R is dense and small.
 //!
-//! The method sees a body only through its contact rows, so the dofs in these rows are interface dofs. Where all rows that touch a node have the same normal n,
-//! the node is turned to axes (n, t, ...), and only its dof along n is an interface dof. Some more dofs are
-//! added where supports and contact do not constrain the interior well.
+//! The method sees a body only through its contact rows, so the dofs in these rows are interface dofs. Where all rows
+//! that touch a node have the same normal n, the node is turned to axes (n, t, ...), and only its dof along n is an
+//! interface dof. Some more dofs are added where supports and contact do not constrain the interior well.
 
 use crate::fem::rigid::AtDofs;
 use crate::linalg::{Blocks, Csr, PART, dot};
@@ -13,13 +14,14 @@ use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
-/// Normals at a node count as parallel if the sine of their angle is at most this. Components across the common normal are dropped as rounding, which is 1e-16
-/// for facets in one plane; four digits are left for coordinates of a mesh far from the origin.
+/// Normals at a node count as parallel if the sine of their angle is at most this. Components across the common normal
+/// are dropped as rounding, which is 1e-16 for facets in one plane; four digits are left for coordinates of a mesh far
+/// from the origin.
 const PARALLEL: f64 = 1e-12;
 
-/// One more interface dof is added for a rigid motion that is constrained by less than this share of what all constrained dofs could do. This is about accuracy, not
-/// only about whether the motion is constrained at all: the condition of the interior is about 1/SAFE times that of a clamped body, which leaves ten of
-/// sixteen digits.
+/// One more interface dof is added for a rigid motion that is constrained by less than this share of what all
+/// constrained dofs could do. This is about accuracy, not only about whether the motion is constrained at all: the
+/// condition of the interior is about 1/SAFE times that of a clamped body, which leaves ten of sixteen digits.
 const SAFE: f64 = 1e-6;
 
 /// The interface dofs of a body.
@@ -40,8 +42,8 @@ impl InterfaceDofs {
         format!("condensed to {} dofs by mumps", self.dofs.len())
     }
 
-    /// Choose the dofs for contact `rows` (columns: all dofs, `dimension` of them a node), `prescribed` (dof, value) and the
-    /// rigid `motions` of the free body.
+    /// Choose the dofs for contact `rows` (columns: all dofs, `dimension` of them a node), `prescribed` (dof, value)
+    /// and the rigid `motions` of the free body.
     pub fn new(dimension: usize, rows: &Csr, prescribed: &[(usize, f64)], motions: AtDofs) -> Self {
         let prescribed: HashSet<usize> = prescribed.iter().map(|entry| entry.0).collect();
         let axes = normals(dimension, rows).into_iter().filter_map(|(node, normals)| {
@@ -128,8 +130,8 @@ impl InterfaceDofs {
         turned
     }
 
-    /// Return the entries (dof, value) of a contact row at one node in the turned axes. Only the component along the normal of a turned node is left; the
-    /// others are rounding.
+    /// Return the entries (dof, value) of a contact row at one node in the turned axes. Only the component along the
+    /// normal of a turned node is left; the others are rounding.
     fn turn_entries(&self, entries: &[(usize, f64)]) -> Vec<(usize, f64)> {
         let node = entries[0].0 / self.dimension;
         let start = node * self.dimension;
@@ -139,8 +141,8 @@ impl InterfaceDofs {
         }
     }
 
-    /// Return the lower triangle of a symmetric `matrix` that stores whole blocks of nodes, in the turned axes: (row, column, value), node by node.
-    /// Zeros are left out, except on the diagonal.
+    /// Return the lower triangle of a symmetric `matrix` that stores whole blocks of nodes, in the turned axes: (row,
+    /// column, value), node by node. Zeros are left out, except on the diagonal.
     pub fn lower_triangle(&self, matrix: &Csr) -> Vec<(usize, usize, f64)> {
         let d = self.dimension;
         let mut lower = Vec::with_capacity(matrix.values.len() / 2 + matrix.rows());
@@ -182,7 +184,8 @@ impl InterfaceDofs {
     }
 }
 
-/// Return the entries of contact rows at each node as vectors, by the number of the node. They are multiples of normals.
+/// Return the entries of contact rows at each node as vectors, by the number of the node. They are multiples of
+/// normals.
 fn normals(dimension: usize, rows: &Csr) -> BTreeMap<usize, Vec<Vec<f64>>> {
     let mut normals: BTreeMap<usize, Vec<Vec<f64>>> = BTreeMap::new();
     for q in 0..rows.rows() {
@@ -271,7 +274,8 @@ mod tests {
         assert_eq!(interface.dofs, [4, 5, 6]);
     }
 
-    /// Contact constrains one translation and the rotation. The other translation takes one more dof, and none if a support constrains it.
+    /// Contact constrains one translation and the rotation. The other translation takes one more dof, and none if a
+    /// support constrains it.
     #[test]
     fn what_contact_does_not_constrain_gets_a_dof() {
         let flat = rows(&[&[(5, 1.0)], &[(7, 1.0)]]);

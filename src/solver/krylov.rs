@@ -11,8 +11,8 @@ use std::rc::Rc;
 
 /// G as a PETSc matrix with a KSP that takes its options from PETSc's table, where they stand while it lives.
 ///
-/// A multigrid preconditioner is kept while G changes, if the user has not decided this by `-ksp_reuse_preconditioner`. Dofs at which it is poor then are
-/// solved exactly around it. This local correction is called a patch.
+/// A multigrid preconditioner is kept while G changes, if the user has not decided this by `-ksp_reuse_preconditioner`.
+/// Dofs at which it is poor then are solved exactly around it. This local correction is called a patch.
 pub struct Krylov {
     session: Session,
     chosen: Chosen,
@@ -35,8 +35,8 @@ pub struct Krylov {
     free: bool,
     /// Whether the next change of G gets a new preconditioner.
     stale: bool,
-    /// Spring stiffnesses in the matrix that the preconditioner was set up with. Where stiff rows are solved exactly, they are at most those that double
-    /// the stiffness under a row.
+    /// Spring stiffnesses in the matrix that the preconditioner was set up with. Where stiff rows are solved exactly,
+    /// they are at most those that double the stiffness under a row.
     prepared: Vec<f64>,
     /// Iterations per digit of the first solve with this preconditioner.
     fresh: Option<f64>,
@@ -48,19 +48,23 @@ pub struct Krylov {
     has_rigid_space: bool,
 }
 
-/// Growth of the iterations, over those with a fresh preconditioner, at which a new one is set up: a kept one costs at most half as many iterations again.
+/// Growth of the iterations, over those with a fresh preconditioner, at which a new one is set up: a kept one costs at
+/// most half as many iterations again.
 const WORN: f64 = 1.5;
 
-/// A patch has at most one in so many dofs. With 1, 2, 4, 8 and without patches `flange` (P1, n = 4, layer 1e8) takes 150, 150, 150, 401 and 434
-/// iterations, 1.6, 1.6, 1.6, 2.2 and 1.9 s, and `hertz-sphere` (P1, n = 12) 54, 54, 54, 65 and 75, 2.4, 2.4, 2.4, 2.2 and 2.1 s.
+/// A patch has at most one in so many dofs. With 1, 2, 4, 8 and without patches `flange` (P1, n = 4, layer 1e8) takes
+/// 150, 150, 150, 401 and 434 iterations, 1.6, 1.6, 1.6, 2.2 and 1.9 s, and `hertz-sphere` (P1, n = 12) 54, 54, 54, 65
+/// and 75, 2.4, 2.4, 2.4, 2.2 and 2.1 s.
 const PATCHED: usize = 4;
 
-/// Number of iterations up to which a solve is too short to judge the preconditioner: one iteration more or less is a tenth of it.
+/// Number of iterations up to which a solve is too short to judge the preconditioner: one iteration more or less is a
+/// tenth of it.
 const FEW: usize = 12;
 
 impl Krylov {
-    /// Start from G = K, with the options that were chosen. `near_null_space` has the rigid motions for the algebraic multigrid GAMG, one entry a dof
-    /// each. With an `interpolation` from a coarse level, PETSc's `mg` has two levels. Collective if other ranks have rows of K.
+    /// Start from G = K, with the options that were chosen. `near_null_space` has the rigid motions for the algebraic
+    /// multigrid GAMG, one entry a dof each. With an `interpolation` from a coarse level, PETSc's `mg` has two levels.
+    /// Collective if other ranks have rows of K.
     ///
     /// # Errors
     /// PETSc's refusal of a matrix or an option value.
@@ -134,14 +138,14 @@ impl Krylov {
         })
     }
 
-    /// Return how many layers of the graph of G are added around the dofs of a patch. hypre smooths with the matrix of its set-up, so it needs one layer.
-    /// The smoothers of two levels of multigrid use G itself, so they need none.
+    /// Return how many layers of the graph of G are added around the dofs of a patch. hypre smooths with the matrix of
+    /// its set-up, so it needs one layer. The smoothers of two levels of multigrid use G itself, so they need none.
     fn layers(&self) -> usize {
         usize::from(self.ksp.pc_type() != "mg")
     }
 
-    /// Keep the preconditioner and put a patch around it at the dofs where it is poor. Return false if the patch would cost more than a new preconditioner or
-    /// cannot be made.
+    /// Keep the preconditioner and put a patch around it at the dofs where it is poor. Return false if the patch would
+    /// cost more than a new preconditioner or cannot be made.
     fn patch(&mut self, dofs: &[usize]) -> Result<bool> {
         let layers = self.layers();
         if dofs.len() * (1 + layers) * PATCHED > self.matrix.total() {
@@ -159,7 +163,8 @@ impl Krylov {
         Ok(true)
     }
 
-    /// Keep the preconditioner or set up a new one, after a change of G. Rows that have changed much, or are stiff for a new one, are solved exactly.
+    /// Keep the preconditioner or set up a new one, after a change of G. Rows that have changed much, or are stiff for
+    /// a new one, are solved exactly.
     fn renew(&mut self, change: &Change) -> Result<()> {
         let &Change { rows, springs, soft, .. } = change;
         self.prepared.resize(springs.len(), 0.0);
@@ -179,7 +184,8 @@ impl Krylov {
         Ok(())
     }
 
-    /// Compare the iterations per digit of a solve with those of the first solve. The next change of G gets a new preconditioner if they have grown too much.
+    /// Compare the iterations per digit of a solve with those of the first solve. The next change of G gets a new
+    /// preconditioner if they have grown too much.
     fn judge(&mut self, solved: &SolveOutcome) {
         if self.keeps && solved.iterations > FEW {
             let pace = solved.iterations as f64 / -log10(self.reached);
@@ -285,7 +291,8 @@ impl InnerSolver for Krylov {
     }
 }
 
-/// Return the number of levels of PETSc's `mg`, which must not exceed `most`: PETSc would call interpolations between further levels that do not exist.
+/// Return the number of levels of PETSc's `mg`, which must not exceed `most`: PETSc would call interpolations between
+/// further levels that do not exist.
 ///
 /// # Errors
 /// There are more levels.
@@ -307,15 +314,18 @@ fn check_levels(ksp: &Ksp, prefix: &str, most: usize) -> Result<usize> {
     .help("give no more by -pc_mg_levels, or take a multigrid that makes its own levels: -pc_type gamg or hypre"))
 }
 
-/// Ratio of the stiffnesses under a contact row beyond which a preconditioner is poor there, in either direction. With 1.2, 1.5, 2 and 3
-/// `groove3d` (n = 16, layer 1e7) takes 50, 50, 56 and 56 iterations, `hertz-sphere` (P1, n = 12, layer 1e6) 56, 54, 56 and 117.
+/// Ratio of the stiffnesses under a contact row beyond which a preconditioner is poor there, in either direction. With
+/// 1.2, 1.5, 2 and 3 `groove3d` (n = 16, layer 1e7) takes 50, 50, 56 and 56 iterations, `hertz-sphere` (P1, n = 12,
+/// layer 1e6) 56, 54, 56 and 117.
 const POOR: f64 = 1.5;
 
-/// Return the dofs, sorted, of contact rows at which a preconditioner with springs `old` is poor for springs `new`: the stiffnesses under the row
-/// differ by more than the factor [`POOR`]. `soft` are the springs that double the stiffness under a row; all three have one entry a row.
+/// Return the dofs, sorted, of contact rows at which a preconditioner with springs `old` is poor for springs `new`: the
+/// stiffnesses under the row differ by more than the factor [`POOR`]. `soft` are the springs that double the stiffness
+/// under a row; all three have one entry a row.
 ///
-/// The eigenvalues of G_old^-1 G_new lie between the smallest and the largest ratio of the springs. Where the body is stiff
-/// compared with its springs, they do not come near these bounds. So the stiffness of the body counts with that of the spring.
+/// The eigenvalues of G_old^-1 G_new lie between the smallest and the largest ratio of the springs. Where the body is
+/// stiff compared with its springs, they do not come near these bounds. So the stiffness of the body counts with that
+/// of the spring.
 fn poor_dofs(rows: &Csr, soft: &[f64], old: &[f64], new: &[f64]) -> Vec<usize> {
     let is_poor = |q: &usize| {
         let (before, after) = (soft[*q] + old[*q], soft[*q] + new[*q]);

@@ -1,7 +1,9 @@
-//! Inner solvers: how G z = r is solved, where G is the stiffness K of one body, or of all bodies, plus springs at contact points.
+//! Inner solvers: how G z = r is solved, where G is the stiffness K of one body, or of all bodies, plus springs at
+//! contact points.
 //!
-//! A [`SpringMatrix`] holds G = K + B' diag(d) B and solves with it by an [`InnerSolver`]: [`Krylov`] or [`Dense`]. [`InterfaceDofs`] are those of a body that is
-//! condensed to its contact. A new way to solve is a new file with an implementation of `InnerSolver`.
+//! A [`SpringMatrix`] holds G = K + B' diag(d) B and solves with it by an [`InnerSolver`]: [`Krylov`] or [`Dense`].
+//! [`InterfaceDofs`] are those of a body that is condensed to its contact. A new way to solve is a new file with an
+//! implementation of `InnerSolver`.
 //!
 //! Where a function says nothing else, its errors are failures of the solver library, and PETSc being out of memory.
 
@@ -94,7 +96,8 @@ impl std::ops::AddAssign for BodyCounts {
     }
 }
 
-/// A change of G = K + B' diag(d) B. An iterative solver may keep the preconditioner of an earlier G and correct it by exact solves on a few dofs.
+/// A change of G = K + B' diag(d) B. An iterative solver may keep the preconditioner of an earlier G and correct it by
+/// exact solves on a few dofs.
 pub struct Change<'a> {
     /// Writes the values of G, in the order of the pattern that the solver was made with.
     pub write: &'a dyn Fn(&mut [f64]),
@@ -127,7 +130,8 @@ pub trait InnerSolver {
     /// Failures of the solver library. A solve that does not converge is reported in [`SolveOutcome`].
     fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<SolveOutcome>;
 
-    /// Solve G z = r until `enough` accepts an iterate, for iterative solvers. If the user set a tolerance, that ends the solve instead.
+    /// Solve G z = r until `enough` accepts an iterate, for iterative solvers. If the user set a tolerance, that ends
+    /// the solve instead.
     fn solve_until(&mut self, r: &[f64], z: &mut [f64], _enough: &mut ConvergenceTest) -> Result<SolveOutcome> {
         self.solve(r, z)
     }
@@ -142,14 +146,14 @@ pub trait InnerSolver {
         0.0
     }
 
-    /// Compute z = M^-1 r with a fixed symmetric M that approximates G: one application of the preconditioner of an iterative solver, a
-    /// whole solve of a direct one.
+    /// Compute z = M^-1 r with a fixed symmetric M that approximates G: one application of the preconditioner of an
+    /// iterative solver, a whole solve of a direct one.
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<SolveOutcome> {
         self.solve(r, z)
     }
 
-    /// Return the numbers of symbolic factorisations, of numeric factorisations or preconditioner set-ups, and of exact solves that were set up around a
-    /// preconditioner, so far.
+    /// Return the numbers of symbolic factorisations, of numeric factorisations or preconditioner set-ups, and of exact
+    /// solves that were set up around a preconditioner, so far.
     fn factorizations(&self) -> [usize; 3];
 
     /// Return whether the factorisations are dense ones, which are counted separately.

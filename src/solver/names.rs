@@ -1,4 +1,5 @@
-//! Common names of the options of PETSc's solvers, without dash and prefix. The refusal of a mistyped option suggests the nearest of them.
+//! Common names of the options of PETSc's solvers, without dash and prefix. The refusal of a mistyped option suggests
+//! the nearest of them.
 
 use crate::error::nearest;
 
@@ -25,8 +26,8 @@ pub fn looks(name: &str) -> bool {
     name.split('_').any(|word| LOOKING.contains(&word))
 }
 
-/// Return the prefix of the nested solver in an option name that ends in `leaf`: `sub_` for `sub_pc_type` with the leaf `pc_type`, and an empty
-/// prefix for the leaf itself. `None` for other names.
+/// Return the prefix of the nested solver in an option name that ends in `leaf`: `sub_` for `sub_pc_type` with the leaf
+/// `pc_type`, and an empty prefix for the leaf itself. `None` for other names.
 pub(super) fn nest_of<'a>(name: &'a str, leaf: &str) -> Option<&'a str> {
     name.strip_suffix(leaf).filter(|nest| nest.is_empty() || nest.ends_with('_'))
 }

@@ -1,14 +1,18 @@
 //! How PETSc options reach a solver.
 //!
-//! Users type PETSc options as in any PETSc program, for all bodies (`-ksp_type cg`) or for one (`-upper_ksp_type cg`). An option
-//! for all bodies is called *plain* here, and an option that starts with the name of a body is that body's *own*.
+//! Users type PETSc options as in any PETSc program, for all bodies (`-ksp_type cg`) or for one (`-upper_ksp_type cg`).
+//! An option for all bodies is called *plain* here, and an option that starts with the name of a body is that body's
+//! *own*.
 //!
-//! 1. [`UserOptions`] gives each solver its options ([`Chosen`]). A plain option of a PETSc object (KSP, PC, Mat) applies to every solver that has no
-//!    own option of that name. The program adds its choice where the user wrote nothing.
-//! 2. PETSc does not fall back from a prefixed name to the plain one. So these options stand in its table under the prefix of a [`OptionGroup`] for as long as
-//!    its solvers live. The prefix is the name of the body if the body has options of its own, and `newton` for the matrix of all bodies. Other
-//!    bodies with the same options share a prefix, such as `hypre_bodies`, since the table holds only 512 options.
-//! 3. When all solvers are set up, [`unread()`] goes through what nobody has read. A mistyped name ends the run before it starts.
+//! 1. [`UserOptions`] gives each solver its options ([`Chosen`]). A plain option of a PETSc object (KSP, PC, Mat)
+//!    applies to every solver that has no own option of that name. The program adds its choice where the user wrote
+//!    nothing.
+//! 2. PETSc does not fall back from a prefixed name to the plain one. So these options stand in its table under the
+//!    prefix of a [`OptionGroup`] for as long as its solvers live. The prefix is the name of the body if the body has
+//!    options of its own, and `newton` for the matrix of all bodies. Other bodies with the same options share a prefix,
+//!    such as `hypre_bodies`, since the table holds only 512 options.
+//! 3. When all solvers are set up, [`unread()`] goes through what nobody has read. A mistyped name ends the run before
+//!    it starts.
 
 use super::names::{self, WHOLE, is_control_of_mumps, looks, nest_of};
 use crate::error::{Error, Kind, Result};
@@ -35,7 +39,8 @@ impl UserOptions {
         Self(session.options().typed())
     }
 
-    /// Return the options of the solver with a prefix: its own ones, and plain ones of PETSc's objects that it has not as its own.
+    /// Return the options of the solver with a prefix: its own ones, and plain ones of PETSc's objects that it has not
+    /// as its own.
     pub fn of(&self, prefix: &str) -> Chosen {
         let mut chosen = Chosen { prefix: prefix.to_owned(), choices: BTreeMap::new() };
         for (start, origin) in [(format!("-{prefix}_"), OptionOrigin::Own), ("-".to_owned(), OptionOrigin::Plain)] {
@@ -81,8 +86,8 @@ impl SolverOption {
     }
 }
 
-/// The options of one solver: its own ones, plain ones that it has not as its own, and the program's choice where the user wrote
-/// nothing.
+/// The options of one solver: its own ones, plain ones that it has not as its own, and the program's choice where the
+/// user wrote nothing.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Chosen {
     /// The word before the underscore of the solver's own options: the name of the body.
@@ -92,7 +97,8 @@ pub struct Chosen {
 }
 
 impl Chosen {
-    /// Add an option, unless one of this name is there already. So own options are added first, then plain ones, then defaults.
+    /// Add an option, unless one of this name is there already. So own options are added first, then plain ones, then
+    /// defaults.
     fn add(&mut self, name: &str, value: Option<&str>, origin: OptionOrigin) {
         let choice = || SolverOption { name: name.to_owned(), value: value.map(str::to_owned), origin };
         self.choices.entry(name.to_ascii_lowercase()).or_insert_with(choice);
@@ -165,8 +171,8 @@ impl Chosen {
         words.collect::<Vec<_>>().join(" ")
     }
 
-    /// Return whether the user wrote an option that chooses or steers the solver or its matrix: then the user wants a KSP of PETSc. Controls of
-    /// MUMPS and options that only [look](looks) at a solver do not count.
+    /// Return whether the user wrote an option that chooses or steers the solver or its matrix: then the user wants a
+    /// KSP of PETSc. Controls of MUMPS and options that only [look](looks) at a solver do not count.
     pub fn asks_for_ksp(&self) -> bool {
         self.all_typed().any(|(name, _)| is_of_family(name) && !looks(name) && !is_control_of_mumps(name))
     }
@@ -217,7 +223,8 @@ impl Chosen {
         self.all_typed().any(|(name, _)| name.starts_with(family))
     }
 
-    /// Return whether a preconditioner that the user wrote, also a nested one, does not work with rows on several ranks.
+    /// Return whether a preconditioner that the user wrote, also a nested one, does not work with rows on several
+    /// ranks.
     pub fn is_for_one_rank(&self) -> bool {
         let works = |name: &str, value: &str| match value {
             "hypre" | "gamg" | "jacobi" | "pbjacobi" | "none" | "mg" => true,
@@ -230,7 +237,8 @@ impl Chosen {
         self.all_typed().any(|(name, value)| name.ends_with("pc_type") && !works(name, value))
     }
 
-    /// Put the options into PETSc's table, and return the group of solvers that has them. They leave it with the last solver that holds the group.
+    /// Put the options into PETSc's table, and return the group of solvers that has them. They leave it with the last
+    /// solver that holds the group.
     ///
     /// # Errors
     /// PETSc's table is full, at 512 options.
@@ -293,8 +301,8 @@ impl Drop for OptionGroup {
 /// Split the arguments (without the program's name) into words of the program and words of PETSc, each in order.
 ///
 /// A PETSc option has one dash and two or more letters. It takes the next word as its value unless that looks like an
-/// option. A scene file (`*.toml`) or one of the `commands` is never a value, except of `-options_file`. All words after `--` belong to the
-/// program.
+/// option. A scene file (`*.toml`) or one of the `commands` is never a value, except of `-options_file`. All words
+/// after `--` belong to the program.
 pub fn split(words: impl IntoIterator<Item = String>, commands: &[&str]) -> (Vec<String>, Vec<String>) {
     let (mut program, mut petsc) = (Vec::new(), Vec::new());
     let mut words = words.into_iter().peekable();
@@ -318,8 +326,8 @@ pub fn split(words: impl IntoIterator<Item = String>, commands: &[&str]) -> (Vec
     (program, petsc)
 }
 
-/// Return whether a word is one dash and two or more characters, the first of them a letter. A whole string of options (for `bench --solver`) is
-/// no option.
+/// Return whether a word is one dash and two or more characters, the first of them a letter. A whole string of options
+/// (for `bench --solver`) is no option.
 fn is_petsc_option(word: &str) -> bool {
     let bare = word.strip_prefix('-').filter(|bare| bare.len() >= 2 && !bare.contains(char::is_whitespace));
     bare.is_some_and(|bare| bare.starts_with(|c: char| c.is_ascii_alphabetic()))
@@ -330,7 +338,8 @@ fn is_option(word: &str) -> bool {
     word.strip_prefix('-').is_some_and(|rest| rest.starts_with(|c: char| c == '-' || c.is_ascii_alphabetic()))
 }
 
-/// Return the warnings of options that no solver of any rank has read, with common names. Collective; to be called after all solvers are set up.
+/// Return the warnings of options that no solver of any rank has read, with common names. Collective; to be called
+/// after all solvers are set up.
 ///
 /// # Errors
 /// An option that is not among the common names was not read either: the name is taken for a typing mistake.

@@ -6,8 +6,8 @@ use crate::error::{Error, Kind, Result};
 use crate::petsc::HAS_HYPRE;
 use crate::problem::method::Preset;
 
-/// Options of hypre's algebraic multigrid for elasticity with many solves for each set-up. Chebyshev smoothing makes a solve 2.6 times faster than
-/// hypre's default at the same number of iterations.
+/// Options of hypre's algebraic multigrid for elasticity with many solves for each set-up. Chebyshev smoothing makes a
+/// solve 2.6 times faster than hypre's default at the same number of iterations.
 const HYPRE: [(&str, &str); 7] = [
     ("pc_hypre_type", "boomeramg"),
     ("pc_hypre_boomeramg_coarsen_type", "PMIS"),
@@ -18,8 +18,8 @@ const HYPRE: [(&str, &str); 7] = [
     ("pc_hypre_boomeramg_relax_type_all", "Chebyshev"),
 ];
 
-/// Options that differ where a new preconditioner is set up for nearly every solve. The set-up is four times cheaper, and the iterations are twice as
-/// many.
+/// Options that differ where a new preconditioner is set up for nearly every solve. The set-up is four times cheaper,
+/// and the iterations are twice as many.
 const MADE_OFTEN: [(&str, &str); 4] = [
     ("pc_hypre_boomeramg_coarsen_type", "HMIS"),
     ("pc_hypre_boomeramg_interp_type", "ext+i"),
@@ -27,8 +27,9 @@ const MADE_OFTEN: [(&str, &str); 4] = [
     ("pc_hypre_boomeramg_nodal_coarsen", "6"),
 ];
 
-/// The coarse one of two levels of multigrid for quadratic elements. The fine level has a smoother for all nodes, the coarse one algebraic multigrid for
-/// the linear elements with the same vertices. Together they take half the work and memory of algebraic multigrid for all nodes.
+/// The coarse one of two levels of multigrid for quadratic elements. The fine level has a smoother for all nodes, the
+/// coarse one algebraic multigrid for the linear elements with the same vertices. Together they take half the work and
+/// memory of algebraic multigrid for all nodes.
 const QUADRATIC: [(&str, &str); 2] = [("mg_coarse_ksp_type", "preonly"), ("mg_coarse_pc_type", ALGEBRAIC)];
 
 /// The algebraic multigrid of this PETSc. That of PETSc itself takes more iterations than hypre (docs/solvers.md).
@@ -39,9 +40,10 @@ const ALGEBRAIC: &str = if HAS_HYPRE { "hypre" } else { "gamg" };
 pub enum Smoother {
     /// Symmetric Gauss-Seidel, which converges for every matrix that is symmetric and positive definite.
     GaussSeidel,
-    /// Chebyshev's method, for rows on several ranks. Gauss-Seidel within each rank takes steps that are twice too long, or more, at the borders between
-    /// ranks. Its preconditioner was not positive definite for two spheres of 74 799 dofs on three ranks. Steps of Chebyshev's method do not
-    /// depend on the ranks, and take 1.2 to 1.4 times as long on one rank.
+    /// Chebyshev's method, for rows on several ranks. Gauss-Seidel within each rank takes steps that are twice too
+    /// long, or more, at the borders between ranks. Its preconditioner was not positive definite for two spheres of 74
+    /// 799 dofs on three ranks. Steps of Chebyshev's method do not depend on the ranks, and take 1.2 to 1.4 times as
+    /// long on one rank.
     Chebyshev,
 }
 
@@ -56,14 +58,17 @@ impl Smoother {
     }
 }
 
-/// Relative tolerance of an inner Krylov solve. It is relative to the outer residual, because solves are for corrections.
+/// Relative tolerance of an inner Krylov solve. It is relative to the outer residual, because solves are for
+/// corrections.
 pub const INNER_TOLERANCE: f64 = 1e-6;
 
-/// Number of interface dofs up to which the cost of a dense factorisation need not be compared: it takes 9e6 operations, less than a millisecond.
+/// Number of interface dofs up to which the cost of a dense factorisation need not be compared: it takes 9e6
+/// operations, less than a millisecond.
 const TINY: usize = 300;
 
-/// Return the preset for a plane body whose scene names none, with the reason as text. A factorisation costs little in the plane, so only
-/// lack of memory speaks against it; `memory` are the bytes that earlier bodies have left. In space [`cost`] decides.
+/// Return the preset for a plane body whose scene names none, with the reason as text. A factorisation costs little in
+/// the plane, so only lack of memory speaks against it; `memory` are the bytes that earlier bodies have left. In space
+/// [`cost`] decides.
 pub fn in_plane(body: &BodyFacts, memory: usize) -> (Preset, String) {
     let &BodyFacts { dofs, interface, .. } = body;
     let what = format!("{dofs} dofs in the plane, {interface} of them on the contact");
@@ -108,8 +113,9 @@ pub fn in_words(chosen: &Chosen) -> String {
     format!("{} + {}{inside}", word("ksp_type"), word("pc_type"))
 }
 
-/// Set the default options of a solver where the user typed nothing, and only for the KSP and PC in force. A condensed body has no KSP and no
-/// defaults. With a `smoother`, multigrid has a level for quadratic elements, unless the user typed an option of hypre.
+/// Set the default options of a solver where the user typed nothing, and only for the KSP and PC in force. A condensed
+/// body has no KSP and no defaults. With a `smoother`, multigrid has a level for quadratic elements, unless the user
+/// typed an option of hypre.
 pub fn apply(chosen: &mut Chosen, preset: Preset, smoother: Option<Smoother>) {
     let has_levels = smoother.is_some() && !chosen.has_typed_of("pc_hypre_");
     let pc = match preset {
@@ -134,7 +140,8 @@ pub fn apply(chosen: &mut Chosen, preset: Preset, smoother: Option<Smoother>) {
         // PETSc's own default is 1e-50, whatever the unit of forces is
         chosen.set_default("ksp_atol", "0");
         if is(chosen, "ksp_type", &["cg", "fcg", "pipecg"]) {
-            // the natural norm is that of r'M^-1 r; with a good preconditioner M this is the energy of the error, which the outer residual measures
+            // the natural norm is that of r'M^-1 r; with a good preconditioner M this is the energy of the error, which
+            // the outer residual measures
             chosen.set_default("ksp_norm_type", "natural");
         }
     }

@@ -15,8 +15,8 @@ pub type MakeSubspace = Box<dyn Fn(&[f64]) -> Box<dyn Subspace>>;
 
 /// G of one body, or of all bodies together.
 ///
-/// Only the entries of K that differ from G are stored here; the others are in the solver alone. The rows B stay with the owner, who passes the same rows
-/// to every call that needs them.
+/// Only the entries of K that differ from G are stored here; the others are in the solver alone. The rows B stay with
+/// the owner, who passes the same rows to every call that needs them.
 pub struct SpringMatrix {
     solver: Box<dyn InnerSolver>,
     /// Spring stiffnesses d of G, one a row of B.
@@ -32,8 +32,9 @@ pub struct SpringMatrix {
 }
 
 impl SpringMatrix {
-    /// Start from G = K, whose pattern holds that of B'B. `make` turns K into its solver. `row_stiffness` is b diag(K) b' of each row b of B, with the parts
-    /// of all ranks. With a `coarse` space, rigid motions are put around the preconditioner.
+    /// Start from G = K, whose pattern holds that of B'B. `make` turns K into its solver. `row_stiffness` is b diag(K)
+    /// b' of each row b of B, with the parts of all ranks. With a `coarse` space, rigid motions are put around the
+    /// preconditioner.
     pub fn new(
         stiffness: Rows,
         rows: &Csr,
@@ -92,7 +93,8 @@ impl SpringMatrix {
         done
     }
 
-    /// Make one solve, or one application of the preconditioner. It is counted and timed apart from the set-up that it may need.
+    /// Make one solve, or one application of the preconditioner. It is counted and timed apart from the set-up that it
+    /// may need.
     pub fn apply(&mut self, solve: impl FnOnce(&mut dyn InnerSolver) -> Result<SolveOutcome>) -> Result<SolveOutcome> {
         self.set_up()?;
         self.counts.solves += 1;
@@ -107,15 +109,16 @@ impl SpringMatrix {
         Ok(solved)
     }
 
-    /// Return the largest ratio of a spring stiffness to the stiffness under its row, if it is so large that more than half of the digits of K are lost in G.
+    /// Return the largest ratio of a spring stiffness to the stiffness under its row, if it is so large that more than
+    /// half of the digits of K are lost in G.
     fn steepest(&self) -> Option<f64> {
         let ratios = self.springs.iter().zip(&self.soft).map(|(spring, soft)| spring / soft);
         let largest = ratios.filter(|ratio| ratio.is_finite()).fold(0.0, f64::max);
         (largest > f64::EPSILON.sqrt().recip()).then_some(largest)
     }
 
-    /// Compute y = K x with G, from which the springs are taken out meanwhile. The solver must store G in rows. If PETSc fails, y is NaN, and the run ends
-    /// with that.
+    /// Compute y = K x with G, from which the springs are taken out meanwhile. The solver must store G in rows. If
+    /// PETSc fails, y is NaN, and the run ends with that.
     pub fn multiply_stiffness(&mut self, rows: &Csr, x: &[f64], y: &mut [f64]) {
         let (coupling, springs) = (&self.coupling, &self.springs);
         let product = self
@@ -158,7 +161,8 @@ impl SpringMatrix {
 struct Coupling {
     /// Dofs that this rank owns.
     own: Range<usize>,
-    /// Position in the values of G of every product b_i b_j of every row b, where this rank owns i. Ordered by row, then by i, then by j.
+    /// Position in the values of G of every product b_i b_j of every row b, where this rank owns i. Ordered by row,
+    /// then by i, then by j.
     positions: Vec<u32>,
     /// The distinct ones of these positions, sorted.
     touched: Vec<u32>,
@@ -195,7 +199,8 @@ impl Coupling {
         self.touched.iter().zip(&self.stiffness).for_each(|(&at, stiffness)| g[at as usize] = *stiffness);
     }
 
-    /// Write K + B' diag(d) B into the values of G, where it differs from K. Elsewhere the values are those of K already.
+    /// Write K + B' diag(d) B into the values of G, where it differs from K. Elsewhere the values are those of K
+    /// already.
     fn write(&self, rows: &Csr, springs: &[f64], g: &mut [f64]) {
         self.reset(g);
         let mut remaining = &self.positions[..];

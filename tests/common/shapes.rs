@@ -69,9 +69,10 @@ impl Shape {
     /// The scene with stresses times `stress` and lengths times `length`; the layer has these units already.
     pub fn scene(&self, stress: f64, length: f64, layer: &str) -> Scene {
         let (head, [lower, upper], young, pressure) = (self.head, self.fix, 2.1e5 * stress, 10.0 * stress);
-        let gap = match self.has_groove {
-            true => format!("{:e} * max(0, 1 - (x/{length:e} - 4)^2)^1.5", 5e-4 * length),
-            false => "0".to_owned(),
+        let gap = if self.has_groove {
+            format!("{:e} * max(0, 1 - (x/{length:e} - 4)^2)^1.5", 5e-4 * length)
+        } else {
+            "0".to_owned()
         };
         let scene = Scene::new(format!(
             r#"{head}

@@ -54,17 +54,18 @@ Transfinite Curve{3}=16;MeshSize{:}=0.5;Point(11)={0,5,0,0.5};Point(12)={2,5,0,0
         let _ = writeln!(text, "Point({i})={{{x},{y},0,0.5}};Line({i})={{{},{i}}};", if i == 21 { 11 } else { i - 1 });
     }
     let _ = writeln!(text, "Line(12)={{{last},12}};Curve Loop(2)={{11,21:{last},12}};Plane Surface(2)={{2}};");
-    text += &match space {
-        false => format!(
-            "Physical Surface(\"lower\")={{1}};Physical Surface(\"upper\")={{2}};Physical Curve(\"top\")={{3}};
-Physical Curve(\"floor\")={{1}};Physical Curve(\"under\")={{22:{last}}};Physical Curve(\"back\")={{11}};"
-        ),
-        true => format!(
+    text += &if space {
+        format!(
             "e()=Extrude{{0,0,0.3}}{{Surface{{1,2}};}};Physical Volume(\"lower\")={{1}};Physical Volume(\"upper\")={{2}};
 Physical Surface(\"top\")={{e(4)}};Physical Surface(\"floor\")={{e(2)}};
 Physical Surface(\"under\")={{e(10):e({})}};Physical Surface(\"back\")={{e(8)}};",
             8 + underside.len()
-        ),
+        )
+    } else {
+        format!(
+            "Physical Surface(\"lower\")={{1}};Physical Surface(\"upper\")={{2}};Physical Curve(\"top\")={{3}};
+Physical Curve(\"floor\")={{1}};Physical Curve(\"under\")={{22:{last}}};Physical Curve(\"back\")={{11}};"
+        )
     };
     text
 }

@@ -104,9 +104,10 @@ impl Surface {
                 for &(i, j) in &EDGES[..vertices * (vertices - 1) / 2] {
                     let (p, q) = (simplex[i].min(simplex[j]) as usize, simplex[i].max(simplex[j]) as usize);
                     let middle = *middles.entry((p, q)).or_insert_with(|| {
-                        points.push(match q < front {
-                            true => self.point::<D>(&[0, 1].map(|c| 0.5 * (parameters[p][c] + parameters[q][c]))),
-                            false => std::array::from_fn(|c| 0.5 * (points[p][c] + points[q][c])),
+                        points.push(if q < front {
+                            self.point::<D>(&[0, 1].map(|c| 0.5 * (parameters[p][c] + parameters[q][c])))
+                        } else {
+                            std::array::from_fn(|c| 0.5 * (points[p][c] + points[q][c]))
                         });
                         points.len() as u32 - 1
                     });

@@ -56,8 +56,8 @@ impl PairPoints {
     }
 }
 
-/// Return the relative error in L2 of the pressures of a run against those of another run, over all pairs; `None` where they cannot be
-/// compared.
+/// Return the relative error in L2 of the pressures of a run against those of another run, over all pairs; `None` where
+/// they cannot be compared.
 pub(super) fn difference(run: &[PairPoints], reference: &[PairPoints]) -> Option<f64> {
     if run.is_empty() || run.len() != reference.len() {
         return None;
@@ -71,7 +71,8 @@ pub(super) fn difference(run: &[PairPoints], reference: &[PairPoints]) -> Option
     relative(run, &run.iter().map(known).collect::<Option<Vec<_>>>()?)
 }
 
-/// Return the relative error in L2 of the pressures of a run against the `reference` of its contact; `None` without one, or with several pairs.
+/// Return the relative error in L2 of the pressures of a run against the `reference` of its contact; `None` without
+/// one, or with several pairs.
 pub(super) fn closed_form(scene: &Scene, run: &[PairPoints]) -> Option<f64> {
     // with several pairs it is not known which table belongs to which contact
     let (&[contact], [own]) = (&scene.pairs().collect::<Vec<_>>()[..], run) else { return None };
@@ -80,7 +81,8 @@ pub(super) fn closed_form(scene: &Scene, run: &[PairPoints]) -> Option<f64> {
     relative(run, &[known])
 }
 
-/// Return the relative error of a run against the known pressures at its points, n for each pair; `None` if it is not finite.
+/// Return the relative error of a run against the known pressures at its points, n for each pair; `None` if it is not
+/// finite.
 fn relative(run: &[PairPoints], known: &[Vec<f64>]) -> Option<f64> {
     let mut squares = Squares::default();
     for (run, known) in run.iter().zip(known) {

@@ -1,5 +1,5 @@
-//! `winkler bench`: run a scene with every mesh, order, inner solver, method and number of ranks that was asked for, each in a process of its
-//! own. Times, memory, counters and errors are written as a table and plots.
+//! `winkler bench`: run a scene with every mesh, order, inner solver, method and number of ranks that was asked for,
+//! each in a process of its own. Times, memory, counters and errors are written as a table and plots.
 
 mod compare;
 mod plan;
@@ -28,8 +28,8 @@ const TABLE: &str = "bench.csv";
 /// Return the exit code: 1 if a run did not converge, was refused or did not end in time.
 ///
 /// # Errors
-/// Command lines that make no sense, scenes that cannot be read, a folder that cannot be written, a signal. A failure of a run is no error,
-/// but a row.
+/// Command lines that make no sense, scenes that cannot be read, a folder that cannot be written, a signal. A failure
+/// of a run is no error, but a row.
 pub fn bench(interrupt: &Interrupt, request: &BenchArgs) -> Result<i32> {
     interrupt.hold();
     if Session::is_one_of_several() {
@@ -47,9 +47,10 @@ pub fn bench(interrupt: &Interrupt, request: &BenchArgs) -> Result<i32> {
     let (mut rows, mut meshed) = (Vec::new(), BTreeSet::new());
     for case in &bench.plan.cases {
         bar.set_message(case.label.clone());
-        let mut row = match bench.is_beyond(case, &rows) {
-            true => Row::unsolved("skipped", "an earlier mesh took too long"),
-            false => bench.measure(case, &runner, reference.as_deref(), &mut meshed)?,
+        let mut row = if bench.is_beyond(case, &rows) {
+            Row::unsolved("skipped", "an earlier mesh took too long")
+        } else {
+            bench.measure(case, &runner, reference.as_deref(), &mut meshed)?
         };
         if row.method.is_empty() {
             bench.plan.value(case, "asked").clone_into(&mut row.method);
@@ -93,14 +94,16 @@ impl Benchmark {
         Ok(Some(found))
     }
 
-    /// Return whether a case differs only by its mesh from a row that did not end in time. Lists of meshes go from coarse to fine.
+    /// Return whether a case differs only by its mesh from a row that did not end in time. Lists of meshes go from
+    /// coarse to fine.
     fn is_beyond(&self, case: &Case, rows: &[Measured]) -> bool {
         let columns = &self.plan.columns;
         let is_like = |key: &[String]| (0..columns.len()).all(|k| is_of_mesh(&columns[k]) || key[k] == case.key[k]);
         rows.iter().any(|measured| measured.row.status == "timeout" && is_like(&measured.case.key))
     }
 
-    /// Run a case as often as asked for, and return its row. `meshed` has the overrides of meshes that are in the cache.
+    /// Run a case as often as asked for, and return its row. `meshed` has the overrides of meshes that are in the
+    /// cache.
     fn measure(
         &self,
         case: &Case,
@@ -137,10 +140,11 @@ impl Benchmark {
         Ok(row)
     }
 
-    /// Set the error of every row that has none, against the row of the finest mesh with the same values of all keys that are not of the mesh.
+    /// Set the error of every row that has none, against the row of the finest mesh with the same values of all keys
+    /// that are not of the mesh.
     ///
-    /// Rows of the finest mesh have no error. Of several rows with as many dofs and the same order, the one with the smallest residual is the
-    /// reference.
+    /// Rows of the finest mesh have no error. Of several rows with as many dofs and the same order, the one with the
+    /// smallest residual is the reference.
     fn compare_with_finest(&self, rows: &mut [Measured], runner: &Runner) {
         let keys = self.plan.columns.len() - COLUMNS.len();
         let is_alike =
@@ -161,7 +165,8 @@ impl Benchmark {
         found.into_iter().for_each(|(index, error, of)| rows[index].row.set_error(error, of));
     }
 
-    /// Return the table with one line for each row: the values that distinguish it, the method that ran, and the numbers that some row has.
+    /// Return the table with one line for each row: the values that distinguish it, the method that ran, and the
+    /// numbers that some row has.
     fn summary(&self, rows: &[Measured]) -> String {
         let mut named = self.plan.varied(rows.iter().map(|measured| &measured.case.key));
         named.retain(|&column| self.plan.columns[column] != "asked");

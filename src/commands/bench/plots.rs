@@ -5,7 +5,8 @@ use crate::commands::rows::Row;
 use crate::linalg::fit;
 use crate::output::{Color, Plot, PlotAxis, Series, Style, safe_name};
 
-/// Return all plots for which the rows have numbers, with the names of their files. With several scenes a name has the scene in it.
+/// Return all plots for which the rows have numbers, with the names of their files. With several scenes a name has the
+/// scene in it.
 pub(super) fn plots(rows: &[Measured], bench: &Benchmark) -> Vec<(String, Plot)> {
     let mut plots = Vec::new();
     for (name, scene) in bench.names.iter().zip(&bench.scenes) {
@@ -55,7 +56,8 @@ impl Chart<'_> {
         has_points.then(|| Plot { title: self.title.to_owned(), x: PlotAxis::log(x), y: PlotAxis::log(y), series })
     }
 
-    /// Return whether all runs are on one rank. Their CPU time is then that of an idle machine, whatever else runs on it.
+    /// Return whether all runs are on one rank. Their CPU time is then that of an idle machine, whatever else runs on
+    /// it.
     fn is_serial(&self) -> bool {
         self.rows.iter().all(|measured| self.bench.plan.value(&measured.case, "ranks") == "1")
     }
@@ -81,7 +83,8 @@ impl Chart<'_> {
         self.plot(&format!("relative error ({of})"), self.time_label(), series)
     }
 
-    /// Return the plot of a number against the dofs, with the exponent of the fitted power law in the name of each curve.
+    /// Return the plot of a number against the dofs, with the exponent of the fitted power law in the name of each
+    /// curve.
     fn against_dofs(&self, number: impl Fn(&Row) -> Option<f64>, label: &str) -> Option<Plot> {
         let mut series = self.series(|row| Some((row.dofs? as f64, number(row)?)));
         for series in &mut series {
@@ -91,8 +94,8 @@ impl Chart<'_> {
         self.plot("degrees of freedom", label, series)
     }
 
-    /// Return the points (x, y) of each curve, sorted by x. The rows of a curve differ only in the keys of the mesh, and its name
-    /// has the other values that differ between rows, with the method that ran.
+    /// Return the points (x, y) of each curve, sorted by x. The rows of a curve differ only in the keys of the mesh,
+    /// and its name has the other values that differ between rows, with the method that ran.
     fn series(&self, point: impl Fn(&Row) -> Option<(f64, f64)>) -> Vec<Series> {
         let plan = &self.bench.plan;
         let keys: Vec<Vec<String>> = self.rows.iter().map(|measured| self.key(measured)).collect();
@@ -124,12 +127,12 @@ impl Chart<'_> {
     }
 }
 
-/// Relative difference of errors below which two runs are those of different solvers on one mesh. Solvers of one mesh have errors with the same two
-/// digits (docs/benchmarks.md); halving the size of linear elements halves the error.
+/// Relative difference of errors below which two runs are those of different solvers on one mesh. Solvers of one mesh
+/// have errors with the same two digits (docs/benchmarks.md); halving the size of linear elements halves the error.
 const ALIKE: f64 = 0.01;
 
-/// Return the points (error, time) that no other point beats, sorted by the error. Each is faster than all points with a smaller error, and more
-/// accurate than all faster ones by more than [`ALIKE`].
+/// Return the points (error, time) that no other point beats, sorted by the error. Each is faster than all points with
+/// a smaller error, and more accurate than all faster ones by more than [`ALIKE`].
 fn pareto(mut points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     points.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.total_cmp(&b.0)));
     let mut front: Vec<(f64, f64)> = Vec::new();
@@ -142,8 +145,9 @@ fn pareto(mut points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     front
 }
 
-/// Return the exponent of the power law through points (size, value) sorted by their sizes, by least squares of the logarithms; none with fewer
-/// than three sizes, since it would be no more than the slope of a line between two measured times.
+/// Return the exponent of the power law through points (size, value) sorted by their sizes, by least squares of the
+/// logarithms; none with fewer than three sizes, since it would be no more than the slope of a line between two
+/// measured times.
 fn exponent(points: &[(f64, f64)]) -> Option<f64> {
     if points.chunk_by(|a, b| a.0 == b.0).count() < 3 {
         return None;

@@ -70,7 +70,8 @@ impl Runner {
         self.folder.join(format!("{start}-{:.12}", digest(&name)))
     }
 
-    /// Check that a case can have its folder, and that results to compare `against` are not among those that it replaces.
+    /// Check that a case can have its folder, and that results to compare `against` are not among those that it
+    /// replaces.
     ///
     /// # Errors
     /// A link or a log of another origin is in the way, or the results are those of the case.
@@ -90,7 +91,8 @@ impl Runner {
         refuse_foreign(&folder.join(LOG))
     }
 
-    /// Make the mesh of a case with these overrides. A failure is not reported here, since the run itself fails in the same way.
+    /// Make the mesh of a case with these overrides. A failure is not reported here, since the run itself fails in the
+    /// same way.
     pub fn mesh(&self, case: &Case, overrides: &[String]) -> Result<()> {
         let mut command = Command::new(&self.program);
         command.arg("mesh").arg(&case.scene);
@@ -98,8 +100,8 @@ impl Runner {
         self.finish(command, &self.folder(case)).map(|_| ())
     }
 
-    /// Run a case as often as asked for, or until it fails, and return its row: that of the first run that failed, else of the first, with the
-    /// medians of all times.
+    /// Run a case as often as asked for, or until it fails, and return its row: that of the first run that failed, else
+    /// of the first, with the medians of all times.
     pub fn repeat(&self, case: &Case, ranks: usize) -> Result<Row> {
         let mut rows = Vec::new();
         while rows.len() < self.repeat && rows.iter().all(Row::is_good) {
@@ -138,7 +140,8 @@ impl Runner {
         };
         command.arg("solve").arg(&case.scene).arg("-o").arg(&folder);
         command.args(case.overrides.iter().flat_map(|text| ["--set", text])).args(&case.petsc);
-        // one thread for each rank, unless the user has set another number: otherwise the threads of solvers are compared
+        // one thread for each rank, unless the user has set another number: otherwise the threads of solvers are
+        // compared
         for name in ["OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"] {
             if std::env::var_os(name).is_none() {
                 command.env(name, "1");
@@ -164,7 +167,8 @@ impl Runner {
         })
     }
 
-    /// Start a process, wait for it, and end it when its time is over. Its output goes to [`LOG`] in the folder, behind a line with its command.
+    /// Start a process, wait for it, and end it when its time is over. Its output goes to [`LOG`] in the folder, behind
+    /// a line with its command.
     fn finish(&self, mut command: Command, folder: &Path) -> Result<Ended> {
         fs::create_dir_all(folder).map_err(|cause| Error::file(folder, "create the folder", &cause))?;
         let path = folder.join(LOG);
@@ -192,7 +196,8 @@ impl Runner {
         Ok(Ended { used: answer.ok().and_then(|used| used.ok()), is_late, seconds, output })
     }
 
-    /// Wait for a process. If its time is over or a signal has come, it is ended. Return its answer, and whether it had to be ended.
+    /// Wait for a process. If its time is over or a signal has come, it is ended. Return its answer, and whether it had
+    /// to be ended.
     fn wait(&self, mut child: Child, began: Instant) -> (Answer, bool) {
         let id = Pid::from_raw(child.id() as i32);
         let (send, receive) = mpsc::channel();

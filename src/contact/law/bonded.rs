@@ -3,7 +3,8 @@
 use super::{LayerLaw, Response};
 use std::rc::Rc;
 
-/// The paper's law g without its cut at zero: p(c) of one law for c > 0, and -p(-c) of another law, or of the same one, for c < 0.
+/// The paper's law g without its cut at zero: p(c) of one law for c > 0, and -p(-c) of another law, or of the same one,
+/// for c < 0.
 #[derive(Debug)]
 pub struct Bonded {
     /// The law for c > 0.

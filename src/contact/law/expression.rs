@@ -20,8 +20,8 @@ pub struct ExpressionLaw {
 }
 
 impl ExpressionLaw {
-    /// Make the law at a point, checked for compressions up to `end`, or else up to `size`, the extent of the surfaces. It must have
-    /// p(0) = 0, increasing p and finite p'.
+    /// Make the law at a point, checked for compressions up to `end`, or else up to `size`, the extent of the surfaces.
+    /// It must have p(0) = 0, increasing p and finite p'.
     ///
     /// # Errors
     /// A refusal that points at the expression and names the compression.
@@ -58,7 +58,8 @@ impl ExpressionLaw {
         Self { at_end: self.compressed(0, end), end, ..self }
     }
 
-    /// Check that p(0) is zero and p'(0) finite, and return p(0). `top` is the largest compression that will be checked.
+    /// Check that p(0) is zero and p'(0) finite, and return p(0). `top` is the largest compression that will be
+    /// checked.
     fn check_first_touch(&self, top: f64) -> Result<f64> {
         self.refuse_outside(0.0)?;
         let (first, slope) = self.value(0.0);
@@ -142,8 +143,8 @@ impl LayerLaw for ExpressionLaw {
     }
 }
 
-/// Pressure beyond which a law is a straight line, since only trial states get there. It exceeds every unit of stress, and a product of five
-/// such pressures is still finite.
+/// Pressure beyond which a law is a straight line, since only trial states get there. It exceeds every unit of stress,
+/// and a product of five such pressures is still finite.
 const HUGE: f64 = 1e60;
 /// Number of checked compressions in a factor of ten.
 const STEPS: i32 = 24;
@@ -163,8 +164,8 @@ pub struct Breach {
     pub is_finite: bool,
 }
 
-/// Check that a pressure increases from `first` = p(0) up to the compression `top`, and return the largest compression that was checked. It is
-/// smaller than `top` if the pressure exceeds [`HUGE`] before. `value` gives p and p'.
+/// Check that a pressure increases from `first` = p(0) up to the compression `top`, and return the largest compression
+/// that was checked. It is smaller than `top` if the pressure exceeds [`HUGE`] before. `value` gives p and p'.
 ///
 /// # Errors
 /// The first compression at which it does not increase, or is not finite.

@@ -12,8 +12,8 @@ pub const EXPONENTIAL: &str = "2*x*sinh(c/(2*y))*exp(c/(2*y))";
 /// The law of the parameters x = k1 and y = k3 of a layer that hardens.
 pub const CUBIC: &str = "x*c + y*c^3";
 
-/// Ratio c/c0 beyond which an exponential law is a straight line. The pressure is exp(60) = 1e26 times p0 there: no solution gets so far, and the squares
-/// of such pressures are finite.
+/// Ratio c/c0 beyond which an exponential law is a straight line. The pressure is exp(60) = 1e26 times p0 there: no
+/// solution gets so far, and the squares of such pressures are finite.
 pub const LINE: f64 = 60.0;
 
 /// Make a law with parameters for the contact points `position`.
@@ -52,9 +52,10 @@ fn formed<L: LayerLaw + 'static>(
         let values = parameters.iter().map(|parameter| checked(parameter, x));
         Ok(new(&values.collect::<Result<Vec<f64>>>()?))
     };
-    match parameters.iter().all(|parameter| parameter.value.is_constant()) {
-        true => Ok(Rc::new(at(&[0.0; 3])?)),
-        false => Ok(Rc::new(PerPoint(position.iter().map(at).collect::<Result<_>>()?))),
+    if parameters.iter().all(|parameter| parameter.value.is_constant()) {
+        Ok(Rc::new(at(&[0.0; 3])?))
+    } else {
+        Ok(Rc::new(PerPoint(position.iter().map(at).collect::<Result<_>>()?)))
     }
 }
 

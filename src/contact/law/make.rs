@@ -10,8 +10,8 @@ use crate::problem::layer::LayerSpec;
 use crate::problem::{ContactSpec, Own};
 use std::rc::Rc;
 
-/// Make the law of a pair at the contact points `position`, in compression and, where it is bonded, in tension. `laws` are those that the program
-/// brings, by name.
+/// Make the law of a pair at the contact points `position`, in compression and, where it is bonded, in tension. `laws`
+/// are those that the program brings, by name.
 ///
 /// # Errors
 /// See [`make`].
@@ -38,9 +38,10 @@ pub fn make(spec: &LayerSpec, laws: &OwnLaws, position: &[[f64; 3]]) -> Result<R
         LayerSpec::Pressure { law, up_to } => {
             let size = extent(position);
             let at = |&x: &[f64; 3]| ExpressionLaw::new(law, x, *up_to, size);
-            match law.uses_only_first() {
-                true => Ok(Rc::new(at(&position[0])?)),
-                false => Ok(Rc::new(PerPoint(position.iter().map(at).collect::<Result<_>>()?))),
+            if law.uses_only_first() {
+                Ok(Rc::new(at(&position[0])?))
+            } else {
+                Ok(Rc::new(PerPoint(position.iter().map(at).collect::<Result<_>>()?)))
             }
         }
         form => forms::make(form, position),
@@ -59,8 +60,8 @@ pub type LawMaker<'a> = dyn Fn(&[[f64; 3]]) -> Result<Rc<dyn LayerLaw>> + 'a;
 /// The laws of a Rust program by name. Each entry makes the law of a pair from its contact points.
 pub type OwnLaws = Own<dyn Fn(&[[f64; 3]]) -> Box<dyn LayerLaw>>;
 
-/// Return the law of this name for the contact points `position`. Its pressure, and the energy as its integral, are checked at the first point for
-/// compressions up to `size`, the extent of the surfaces.
+/// Return the law of this name for the contact points `position`. Its pressure, and the energy as its integral, are
+/// checked at the first point for compressions up to `size`, the extent of the surfaces.
 ///
 /// # Errors
 /// An unknown name, and a function that is not the law of a layer.
@@ -79,19 +80,20 @@ fn own(laws: &OwnLaws, name: &str, position: &[[f64; 3]], size: f64) -> Result<R
     }
 }
 
-/// Number of compressions in a factor of ten between which an energy is compared with pressures: neighbours differ by 2.3 %, and
-/// so the bounds of the energy differ by that times the exponent of the law.
+/// Number of compressions in a factor of ten between which an energy is compared with pressures: neighbours differ by
+/// 2.3 %, and so the bounds of the energy differ by that times the exponent of the law.
 const FINE_STEPS: i32 = 100;
 
-/// Number of factors of ten below the largest compression in which they are compared. A formula such as p0 (c0 (exp(c/c0) - 1) - c) loses all digits
-/// at smaller ones, without harm: the energy counts relative to that of the solution.
+/// Number of factors of ten below the largest compression in which they are compared. A formula such as p0 (c0
+/// (exp(c/c0) - 1) - c) loses all digits at smaller ones, without harm: the energy counts relative to that of the
+/// solution.
 const ENERGY_DECADES: i32 = 4;
 
 /// Rounding of an energy that a program sums over many pieces, relative to it.
 const SUMMED: f64 = 1e-9;
 
-/// Return the first compression up to `last` at which the energy P cannot be the integral of the pressure: p increases, so that between
-/// neighbouring compressions P grows by their distance times a pressure between both of theirs.
+/// Return the first compression up to `last` at which the energy P cannot be the integral of the pressure: p increases,
+/// so that between neighbouring compressions P grows by their distance times a pressure between both of theirs.
 fn wrong_energy(law: &dyn LayerLaw, last: f64) -> Option<f64> {
     let at = |step: i32| {
         let c = last * 10f64.powf(f64::from(step) / f64::from(FINE_STEPS) - f64::from(ENERGY_DECADES));

@@ -1,15 +1,15 @@
 //! Laws of Winkler layers: pressure against compression.
 //!
-//! The paper writes sigma_n = g(w) with w = -c, where c is the compression. Here the pressure is p(c) = -g(-c). A law is monotone
-//! with p(0) = 0 and has a bounded tangent on bounded ranges, conditions (6)-(7) of the paper. A new law is a new type, a form in
-//! [`layer`](crate::problem::layer) and a line in `make`. A program that uses this library implements the trait alone:
-//! [`OwnLaws`].
+//! The paper writes sigma_n = g(w) with w = -c, where c is the compression. Here the pressure is p(c) = -g(-c). A law
+//! is monotone with p(0) = 0 and has a bounded tangent on bounded ranges, conditions (6)-(7) of the paper. A new law is
+//! a new type, a form in [`layer`](crate::problem::layer) and a line in `make`. A program that uses this library
+//! implements the trait alone: [`OwnLaws`].
 //!
 //! With p = 0 for c <= 0 a law is a maximal monotone graph of points (c, p). A point is found from its compression
-//! ([`LayerLaw::response`]), from its pressure ([`LayerLaw::compression`]) or from a line of slope -rho that meets the graph
-//! ([`LayerLaw::resolvent`], or [`resolve`] for smoothed laws), by one root finder (`numeric`) where a law has no closed form.
-//! [`LayerLaw::duality_gap`] measures the distance of any (c, p) from the graph. These methods handle the open layer and the ends of
-//! the range.
+//! ([`LayerLaw::response`]), from its pressure ([`LayerLaw::compression`]) or from a line of slope -rho that meets the
+//! graph ([`LayerLaw::resolvent`], or [`resolve`] for smoothed laws), by one root finder (`numeric`) where a law has no
+//! closed form. [`LayerLaw::duality_gap`] measures the distance of any (c, p) from the graph. These methods handle the
+//! open layer and the ends of the range.
 
 mod bonded;
 mod expression;
@@ -64,13 +64,14 @@ pub trait LayerLaw: std::fmt::Debug {
         self.response(point, c).pressure
     }
 
-    /// Return whether the layer is bonded: whether it pulls where it is stretched, at `c < 0`. Such a law has no state without pressure but `c = 0`.
+    /// Return whether the layer is bonded: whether it pulls where it is stretched, at `c < 0`. Such a law has no state
+    /// without pressure but `c = 0`.
     fn is_bonded(&self) -> bool {
         false
     }
 
-    /// Return the compression up to which the law is given at contact point `point`, infinite if it has no end. Beyond it the law
-    /// continues as a straight line, so that iterates may pass it.
+    /// Return the compression up to which the law is given at contact point `point`, infinite if it has no end. Beyond
+    /// it the law continues as a straight line, so that iterates may pass it.
     fn end(&self, _point: usize) -> f64 {
         f64::INFINITY
     }
@@ -95,14 +96,14 @@ pub trait LayerLaw: std::fmt::Debug {
     /// Return the compression c of the only point (c, p) of the graph with c + p/rho = s, for a stiffness per area `rho > 0`
     /// (Minty's parametrisation). It is s itself for `s <= 0` and for an infinite rho; NaN stays NaN.
     ///
-    /// Both c and p/rho grow with s, but not by more than s does. The equation holds to the rounding of p(c), which is a few
-    /// times 1e-16 s times the exponent of the law at c.
+    /// Both c and p/rho grow with s, but not by more than s does. The equation holds to the rounding of p(c), which is
+    /// a few times 1e-16 s times the exponent of the law at c.
     fn resolvent(&self, point: usize, s: f64, rho: f64) -> f64 {
         search(self, point, s, rho)
     }
 
-    /// Return the compression at which the layer has this pressure. It is 0 for `pressure <= 0` and infinite for a pressure that
-    /// the layer cannot reach in double precision; NaN stays NaN.
+    /// Return the compression at which the layer has this pressure. It is 0 for `pressure <= 0` and infinite for a
+    /// pressure that the layer cannot reach in double precision; NaN stays NaN.
     fn compression(&self, point: usize, pressure: f64) -> f64 {
         if !(pressure > 0.0 && pressure < f64::INFINITY) {
             return pressure.clamp(0.0, f64::INFINITY);
@@ -113,20 +114,22 @@ pub trait LayerLaw: std::fmt::Debug {
             .unwrap_or(f64::INFINITY)
     }
 
-    /// Return a bound of Fenchel's gap P(c) + P*(p) - c p of a compression `c` and a `pressure` p, which need not be a point of the graph.
+    /// Return a bound of Fenchel's gap P(c) + P*(p) - c p of a compression `c` and a `pressure` p, which need not be a
+    /// point of the graph.
     ///
-    /// The gap is an energy per area. P*(p) = sup_c (p c - P(c)) is the complementary energy of P, the energy of the law. It is the area
-    /// between the graph and the corner (c, p), and the bound is the rectangle around it,
+    /// The gap is an energy per area. P*(p) = sup_c (p c - P(c)) is the complementary energy of P, the energy of the
+    /// law. It is the area between the graph and the corner (c, p), and the bound is the rectangle around it,
     ///
     /// ```text
     /// (c - phi(p)) (p(c) - p),      phi(p) the compression at the pressure p,
     /// ```
     ///
-    /// which is twice the gap where the law is straight. It is not negative, and zero on the graph to rounding. It is infinite for
-    /// `pressure < 0` unless the layer is bonded, and for a pressure that the layer cannot reach; NaN stays NaN.
+    /// which is twice the gap where the law is straight. It is not negative, and zero on the graph to rounding. It is
+    /// infinite for `pressure < 0` unless the layer is bonded, and for a pressure that the layer cannot reach; NaN
+    /// stays NaN.
     ///
-    /// The rounding of p(c) itself, 1e-16 p times the exponent of the law, does not count as an error of the gap. It equals a
-    /// change of the law's parameters within double precision.
+    /// The rounding of p(c) itself, 1e-16 p times the exponent of the law, does not count as an error of the gap. It
+    /// equals a change of the law's parameters within double precision.
     fn duality_gap(&self, point: usize, c: f64, pressure: f64) -> f64 {
         if c.is_nan() || pressure.is_nan() {
             return f64::NAN;
@@ -192,7 +195,8 @@ pub struct LawState {
 
 /// Return Minty's resolvent: the only state with c + p/rho = `sum` on the law smoothed by `mu`.
 ///
-/// `mu` is an energy per area and `rho > 0` a stiffness per area. With `mu` = 0 the result is the state on the law itself.
+/// `mu` is an energy per area and `rho > 0` a stiffness per area. With `mu` = 0 the result is the state on the law
+/// itself.
 ///
 /// Let c = phi(p) be the inverse of the law. The smoothed law, as on the central path of an interior-point method, is
 ///
@@ -200,12 +204,12 @@ pub struct LawState {
 /// c = phi(p) - mu/p,   p > 0,        kappa = dp/dc = 1 / (phi'(p) + mu/p^2)
 /// ```
 ///
-/// It is strictly monotone and has no corner. At every pressure p the gap s = mu/p remains, so that s p = mu, which is the perturbed
-/// complementarity condition.
+/// It is strictly monotone and has no corner. At every pressure p the gap s = mu/p remains, so that s p = mu, which is
+/// the perturbed complementarity condition.
 ///
-/// The law need not be inverted. Let P(s) be the pressure at which the law itself meets the line with the sum s. A state with the
-/// remaining gap y = mu/p has p = P(`sum` + y), so y is the root of y P(`sum` + y) = mu, where the left side increases with y. The root
-/// is least for a rigid layer, P(s) = rho s, whose gap has a closed form.
+/// The law need not be inverted. Let P(s) be the pressure at which the law itself meets the line with the sum s. A
+/// state with the remaining gap y = mu/p has p = P(`sum` + y), so y is the root of y P(`sum` + y) = mu, where the left
+/// side increases with y. The root is least for a rigid layer, P(s) = rho s, whose gap has a closed form.
 ///
 /// A bonded layer neither opens nor closes, so that nothing is smoothed.
 pub fn resolve(law: &dyn LayerLaw, point: usize, sum: f64, rho: f64, mu: f64) -> LawState {
@@ -230,12 +234,11 @@ pub fn resolve(law: &dyn LayerLaw, point: usize, sum: f64, rho: f64, mu: f64) ->
 /// Return the state on the law itself with c + p/rho = `sum`.
 fn on_law(law: &dyn LayerLaw, point: usize, sum: f64, rho: f64) -> LawState {
     let compression = law.resolvent(point, sum, rho);
-    let (pressure, tangent) = match compression > 0.0 {
-        true => law.pressure_and_tangent(point, compression),
-        false => {
-            let Response { pressure, tangent, .. } = law.response(point, compression);
-            (pressure, tangent)
-        }
+    let (pressure, tangent) = if compression > 0.0 {
+        law.pressure_and_tangent(point, compression)
+    } else {
+        let Response { pressure, tangent, .. } = law.response(point, compression);
+        (pressure, tangent)
     };
     LawState { compression, pressure, tangent }
 }

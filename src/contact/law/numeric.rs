@@ -4,24 +4,25 @@ use crate::linalg::portable::{exp, log};
 
 /// Relative rounding of a law's value. Numbers closer than that are the same.
 const ROUNDING: f64 = 2.0 * f64::EPSILON;
-/// First factor by which the search goes down from the upper bound while it knows no lower one; each next factor is the square
-/// of the one before. Five of them span the 37 decades between a trial state of 1e30 and a layer of 1e-6.
+/// First factor by which the search goes down from the upper bound while it knows no lower one; each next factor is the
+/// square of the one before. Five of them span the 37 decades between a trial state of 1e30 and a layer of 1e-6.
 const DOWN: f64 = 1.0 / 16.0;
 /// Largest exponent d log p/d log c at which a root is accepted because of its short step alone.
 const STEEPEST: f64 = 1e6;
 /// Ratio of two steps beyond which Newton's method is slow. At the corner of c + c^50 the ratios fall to 0.53.
 const SLOW: f64 = 0.75;
-/// Largest number of evaluations. Bisecting the logarithms of all double numbers down to neighbours takes 63, with at most two
-/// slow Newton steps before each.
+/// Largest number of evaluations. Bisecting the logarithms of all double numbers down to neighbours takes 63, with at
+/// most two slow Newton steps before each.
 const MOST: usize = 200;
 
-/// Return the c in (low, high) where an increasing function has the value `target` > 0, searched from `start`. `value` gives the
-/// function and its derivative.
+/// Return the c in (low, high) where an increasing function has the value `target` > 0, searched from `start`. `value`
+/// gives the function and its derivative.
 ///
-/// The search is Newton's method for the logarithm of the value as a function of log c. There, powers are straight lines, and sums
-/// of powers are convex with slopes between the least and the largest exponent. Where a step is hardly shorter than the last one,
-/// the function may be closer to an exponential, so the step is taken for the logarithm of the value as a function of c. Where
-/// this happens twice, or a step leaves the bracket, log c is bisected. NaN counts as too large.
+/// The search is Newton's method for the logarithm of the value as a function of log c. There, powers are straight
+/// lines, and sums of powers are convex with slopes between the least and the largest exponent. Where a step is hardly
+/// shorter than the last one, the function may be closer to an exponential, so the step is taken for the logarithm of
+/// the value as a function of c. Where this happens twice, or a step leaves the bracket, log c is bisected. NaN counts
+/// as too large.
 ///
 /// # Errors
 /// The largest c with a value below `target`, where no larger c was found with a value above.
@@ -70,8 +71,8 @@ pub fn root(
     if reached { Ok(high) } else { Err(low) }
 }
 
-/// Points in (0, 1] and weights of the Gauss-Lobatto rule with 7 points on [-1, 1]. The rule includes the ends of an interval, so
-/// that a kink just before an end does not hide between points.
+/// Points in (0, 1] and weights of the Gauss-Lobatto rule with 7 points on [-1, 1]. The rule includes the ends of an
+/// interval, so that a kink just before an end does not hide between points.
 const LOBATTO: [(f64, f64); 3] = [
     (0.468_848_793_470_714_2, 0.431_745_381_209_862_6),
     (0.830_223_896_278_566_9, 0.276_826_047_361_565_9),
@@ -83,8 +84,8 @@ const MIDDLE: f64 = 256.0 / 525.0;
 /// Largest number of times that an interval is halved.
 const DEPTH: usize = 30;
 
-/// Return the integral of `f` from `a` to `b`. Intervals are halved until the rule on each and on its halves agree to 1e-13 of the
-/// whole integral.
+/// Return the integral of `f` from `a` to `b`. Intervals are halved until the rule on each and on its halves agree to
+/// 1e-13 of the whole integral.
 pub fn integral(f: &dyn Fn(f64) -> f64, a: f64, b: f64) -> f64 {
     let whole = rule(f, a, b);
     halves(f, a, b, whole, 1e-13 * whole.abs(), DEPTH)

@@ -5,16 +5,17 @@ use crate::linalg::portable::hypot;
 
 /// A monotone piecewise cubic curve through (0, 0) and points (c, p), continued as a straight line beyond the last one.
 ///
-/// Slopes at the points are means of the secants on both sides. They are reduced as in Fritsch and Carlson (SIAM J. Numer. Anal. 17,
-/// 1980) so that p' > 0 everywhere. The pressure p is then continuously differentiable and keeps the order of the points.
+/// Slopes at the points are means of the secants on both sides. They are reduced as in Fritsch and Carlson (SIAM J.
+/// Numer. Anal. 17, 1980) so that p' > 0 everywhere. The pressure p is then continuously differentiable and keeps the
+/// order of the points.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
     /// Points with their slopes and the energy up to them, from (0, 0) on.
     knots: Vec<Knot>,
 }
 
-/// Largest norm of the two slopes at the ends of a piece, as shares of its secant. It is three less a margin far above rounding. With
-/// exactly three, a piece with a slope of zero at one end could fall below its end by rounding.
+/// Largest norm of the two slopes at the ends of a piece, as shares of its secant. It is three less a margin far above
+/// rounding. With exactly three, a piece with a slope of zero at one end could fall below its end by rounding.
 const STEEPEST: f64 = 3.0 - 1e-9;
 
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -26,7 +27,8 @@ struct Knot {
 }
 
 impl Table {
-    /// Make a curve through at least one point (c, p). Both coordinates increase from (0, 0), which is not among the points.
+    /// Make a curve through at least one point (c, p). Both coordinates increase from (0, 0), which is not among the
+    /// points.
     pub fn new(points: &[[f64; 2]]) -> Self {
         let mut knots = vec![Knot::default()];
         knots.extend(points.iter().map(|&[c, pressure]| Knot { c, pressure, ..Knot::default() }));

@@ -7,8 +7,8 @@ use std::cell::Cell;
 use std::rc::Rc;
 use std::sync::Arc;
 
-/// Check from far below `scale` to far beyond it that the pressure is the derivative of the energy, the tangent that of the
-/// pressure, and that the pressure increases.
+/// Check from far below `scale` to far beyond it that the pressure is the derivative of the energy, the tangent that of
+/// the pressure, and that the pressure increases.
 fn check(law: &dyn LayerLaw, scale: f64) {
     assert_eq!(law.response(0, 0.0), Response::default());
     assert_eq!(law.response(0, -scale), Response::default());
@@ -81,7 +81,8 @@ fn laws_are_consistent() {
     assert!((p - q).abs() < 1e-13);
 }
 
-/// Beside a piece 10^35 times as steep the slope at zero is reduced to nothing, and the pressure still does not fall below zero.
+/// Beside a piece 10^35 times as steep the slope at zero is reduced to nothing, and the pressure still does not fall
+/// below zero.
 #[test]
 fn a_table_increases_beside_a_jump() {
     let law = Table::new(&[[10659179687.5, 1e-12], [10659179687.500042, 680819702.1484375]]);
@@ -295,8 +296,8 @@ fn what_a_law_cannot_reach() {
     assert_eq!(Ending.duality_gap(0, 1.5, 0.5), f64::INFINITY);
 }
 
-/// Fenchel's gap P(c) + P*(p) - c p is never above its bound, and nowhere far below it: an exponent m of the law makes a ratio of 1 + 1/m or 1 + m at
-/// most, far from the graph, and 2 near it.
+/// Fenchel's gap P(c) + P*(p) - c p is never above its bound, and nowhere far below it: an exponent m of the law makes
+/// a ratio of 1 + 1/m or 1 + m at most, far from the graph, and 2 near it.
 #[test]
 fn the_bound_of_the_gap_is_above_it() {
     for (law, scale) in all_laws() {
@@ -384,7 +385,8 @@ fn searches_ask_a_law_a_few_times() {
     assert!(bent.iter().flatten().all(|&count| count <= 20), "{bent:?}");
 }
 
-/// Return the pressure at which phi(p) - mu/p + p/rho is the sum, by bisection of its logarithm. Here the law is inverted.
+/// Return the pressure at which phi(p) - mu/p + p/rho is the sum, by bisection of its logarithm. Here the law is
+/// inverted.
 fn bisected(law: &dyn LayerLaw, sum: f64, rho: f64, mu: f64) -> f64 {
     let excess = |pressure: f64| law.compression(0, pressure) - mu / pressure + pressure / rho - sum;
     let (mut low, mut high) = (f64::MIN_POSITIVE, 1e300);
@@ -395,7 +397,8 @@ fn bisected(law: &dyn LayerLaw, sum: f64, rho: f64, mu: f64) -> f64 {
     high
 }
 
-/// All laws are checked from open to strongly compressed points, for soft to infinite slopes and for much to hardly any smoothing.
+/// All laws are checked from open to strongly compressed points, for soft to infinite slopes and for much to hardly any
+/// smoothing.
 #[test]
 fn states_are_those_of_the_inverted_law() {
     for (law, scale) in all_laws() {
@@ -440,8 +443,8 @@ fn the_tangent_is_the_slope_and_no_smoothing_is_the_law() {
     }
 }
 
-/// A bonded layer of two laws: each side is its own law, states lie on their lines, and the bound of the gap is zero on the graph alone. Smoothing
-/// changes nothing.
+/// A bonded layer of two laws: each side is its own law, states lie on their lines, and the bound of the gap is zero on
+/// the graph alone. Smoothing changes nothing.
 #[test]
 fn bonded_layers_pull() {
     let bonded =

@@ -1,5 +1,5 @@
-//! A facet as a parametrised curve or surface: where a line meets it, which of its normals passes through a point, and what its normals
-//! may meet at all.
+//! A facet as a parametrised curve or surface: where a line meets it, which of its normals passes through a point, and
+//! what its normals may meet at all.
 
 use crate::contact::side::Side;
 use crate::fem::{area_vector, element, length, minus, unit};
@@ -12,16 +12,19 @@ use rstar::{AABB, RTreeObject, SelectionFunction};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Lost;
 
-/// Largest number of Newton steps for a point on a facet. The start is within a facet's size of the point, and from there each step
-/// doubles the number of correct digits: six steps are enough for a double, and twice as many make up for a bad start.
+/// Largest number of Newton steps for a point on a facet. The start is within a facet's size of the point, and from
+/// there each step doubles the number of correct digits: six steps are enough for a double, and twice as many make up
+/// for a bad start.
 const MOST_STEPS: usize = 12;
 
-/// Rounding of a sum that is zero, as a share of the sizes of its terms. A coordinate of a point on a facet adds six products, whose
-/// factors have three roundings each, to a point that was found in the same way: less than 32 roundings of half an epsilon.
+/// Rounding of a sum that is zero, as a share of the sizes of its terms. A coordinate of a point on a facet adds six
+/// products, whose factors have three roundings each, to a point that was found in the same way: less than 32 roundings
+/// of half an epsilon.
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
 
-/// Distance from the end of a facet, in its parameter, within which a point is moved to the end, so that matching surfaces match exactly. Points are found
-/// to [`ROUNDING`], and a piece of this share of a facet would change no pressure in nine digits.
+/// Distance from the end of a facet, in its parameter, within which a point is moved to the end, so that matching
+/// surfaces match exactly. Points are found to [`ROUNDING`], and a piece of this share of a facet would change no
+/// pressure in nine digits.
 pub(super) const SNAP: f64 = 1e-9;
 
 /// Parameter beyond which a point is neither on a facet nor near it: it has fewer digits than [`SNAP`] needs.
@@ -29,8 +32,8 @@ const AWAY: f64 = SNAP / f64::EPSILON;
 
 /// A facet of side a or b as a parametrised curve or surface x(l), where l are barycentric coordinates.
 ///
-/// Coordinates are measured from its first corner, so that interpolation and subtraction round relative to the size of the facet.
-/// This holds also if the two bodies of a pair lie far from the others of the scene.
+/// Coordinates are measured from its first corner, so that interpolation and subtraction round relative to the size of
+/// the facet. This holds also if the two bodies of a pair lie far from the others of the scene.
 pub(super) struct Facet<const D: usize> {
     pub order: Order,
     /// First corner.
@@ -39,7 +42,8 @@ pub(super) struct Facet<const D: usize> {
     pub x: Vec<[f64; D]>,
     /// Largest distance of a node from the first corner.
     pub size: f64,
-    /// Directions at the corners along which the facet faces the other side: normals, unless they are made of those of both sides.
+    /// Directions at the corners along which the facet faces the other side: normals, unless they are made of those of
+    /// both sides.
     pub normals: [[f64; D]; D],
     /// Outer unit normal in the middle.
     pub direction: [f64; D],
@@ -84,18 +88,19 @@ impl<const D: usize> Facet<D> {
     /// Return a bound of the sum of the sizes of the terms that [`Facet::at`] adds.
     fn terms(&self, l: &[f64; D]) -> f64 {
         let reach = 1.0 + 2.0 * l[1..].iter().map(|l| l.abs()).sum::<f64>();
-        // The quadratic functions, l (2l - 1) and 4 l m for barycentric coordinates l and m, sum to less than 3 reach^2 in size, those of higher
-        // orders to less than 2.3 on their edge, along which tangents are near its size.
+        // The quadratic functions, l (2l - 1) and 4 l m for barycentric coordinates l and m, sum to less than 3 reach^2
+        // in size, those of higher orders to less than 2.3 on their edge, along which tangents are near its size.
         self.size * if self.order == Order::P1 { reach } else { 3.0 * reach * reach }
     }
 
-    /// Return the derivative of x by the barycentric coordinate l[k + 1]. When that coordinate grows, l[0] becomes smaller by as much.
+    /// Return the derivative of x by the barycentric coordinate l[k + 1]. When that coordinate grows, l[0] becomes
+    /// smaller by as much.
     pub fn tangent(&self, k: usize, l: &[f64; D]) -> [f64; D] {
         element::tangent(self.order, &self.x, &self.nearest(l), k)
     }
 
-    /// Return where the line x + t n meets the surface, as barycentric coordinates and t, at most `beside` outside of the facet; `None` if it
-    /// does not meet it there.
+    /// Return where the line x + t n meets the surface, as barycentric coordinates and t, at most `beside` outside of
+    /// the facet; `None` if it does not meet it there.
     ///
     /// # Errors
     /// [`Lost`] if the search does not converge.
@@ -130,8 +135,9 @@ impl<const D: usize> Facet<D> {
         Ok(found.map(|(l, _)| l))
     }
 
-    /// Solve equations in a point of the facet and a distance t by Newton's method from the middle of the facet: from elsewhere it may find
-    /// points that lie on another branch, far from the facet. `distance` gives the start of t from the point and its normal.
+    /// Solve equations in a point of the facet and a distance t by Newton's method from the middle of the facet: from
+    /// elsewhere it may find points that lie on another branch, far from the facet. `distance` gives the start of t
+    /// from the point and its normal.
     ///
     /// # Errors
     /// [`Lost`] if the search does not converge.
@@ -154,10 +160,12 @@ struct Equations<const D: usize> {
     terms: f64,
 }
 
-/// Return a zero of the equations by Newton's method from barycentric coordinates and a distance; `None` if the iterates run away.
+/// Return a zero of the equations by Newton's method from barycentric coordinates and a distance; `None` if the
+/// iterates run away.
 ///
-/// A value counts as zero once it is within the rounding of its own evaluation, since double precision cannot tell whether another
-/// step improves it. That step is made all the same, since the value may have come from far above by a quadratic step.
+/// A value counts as zero once it is within the rounding of its own evaluation, since double precision cannot tell
+/// whether another step improves it. That step is made all the same, since the value may have come from far above by a
+/// quadratic step.
 ///
 /// # Errors
 /// [`Lost`] if the values stay larger.
@@ -186,8 +194,8 @@ fn newton<const D: usize>(
     Err(Lost)
 }
 
-/// The normals of a facet, as a cone: they begin in a ball and turn from its axis by no more than an angle. Curved facets bulge out of the ball of
-/// their nodes by a small part of it.
+/// The normals of a facet, as a cone: they begin in a ball and turn from its axis by no more than an angle. Curved
+/// facets bulge out of the ball of their nodes by a small part of it.
 pub(super) struct Rays<const D: usize> {
     /// Middle of the nodes of the facet.
     middle: [f64; D],

@@ -1,9 +1,9 @@
-//! Common pieces of two surfaces. Facets of side a face facets of side b along the normals of side a. They are cut into pieces
-//! on which products of shape functions of both sides are integrated exactly.
+//! Common pieces of two surfaces. Facets of side a face facets of side b along the normals of side a. They are cut into
+//! pieces on which products of shape functions of both sides are integrated exactly.
 //!
 //! Normals are interpolated between the vertices of side a, so that curved surfaces are covered without gaps or
-//! overlaps between neighbouring facets. A piece is an interval ([`in_plane`]) or a convex polygon ([`in_space`]) in the
-//! parameters of one facet of side a.
+//! overlaps between neighbouring facets. A piece is an interval ([`in_plane`]) or a convex polygon ([`in_space`]) in
+//! the parameters of one facet of side a.
 
 mod facet;
 mod plane;
@@ -55,8 +55,8 @@ impl<const D: usize> Intersection<D> {
 }
 
 impl<const D: usize> Intersection<D> {
-    /// Return the integration points of all facets of a side that is before a rigid obstacle. The obstacle has the facets of the side itself, at no
-    /// distance, so that its forces are the opposite ones.
+    /// Return the integration points of all facets of a side that is before a rigid obstacle. The obstacle has the
+    /// facets of the side itself, at no distance, so that its forces are the opposite ones.
     pub fn of_one(a: &Side<D>) -> Self {
         let degree = match (D, a.facets.order) {
             (2, order) => 2 * order.degree() + 3,
@@ -86,8 +86,8 @@ impl<const D: usize> Intersection<D> {
 /// A function that finds the common pieces of two surfaces.
 pub type Cut<const D: usize> = fn(&Side<D>, &Side<D>, &Reach) -> Intersection<D>;
 
-/// Share from which a facet counts as fully paired: by quadrature, the length of a curve differs a little between a facet and
-/// its pieces.
+/// Share from which a facet counts as fully paired: by quadrature, the length of a curve differs a little between a
+/// facet and its pieces.
 pub(super) const WHOLE: f64 = 1.0 - 1e-3;
 
 /// The limits of distance and inclination within which two facets face each other.
@@ -115,10 +115,11 @@ pub struct Refused {
 }
 
 impl Reach {
-    /// Return the limits for two surfaces whose facets may be inclined by `angle` degrees and, if it is given, be apart by `distance`.
+    /// Return the limits for two surfaces whose facets may be inclined by `angle` degrees and, if it is given, be apart
+    /// by `distance`.
     ///
-    /// The overlap is at most the size of the smaller surface, and at most the thickness of a body behind its surface, its volume
-    /// over the area: a larger overlap would reach the far side of a thin body.
+    /// The overlap is at most the size of the smaller surface, and at most the thickness of a body behind its surface,
+    /// its volume over the area: a larger overlap would reach the far side of a thin body.
     pub fn between<const D: usize>(a: &Side<D>, b: &Side<D>, angle: f64, distance: Option<f64>) -> Self {
         let area = |side: &Side<D>| side.mean_measure() * side.facets.count() as f64;
         let extent = |side: &Side<D>| area(side).powf(1.0 / (D - 1) as f64);
@@ -148,8 +149,8 @@ impl Reach {
 }
 
 impl Refused {
-    /// Return whether `reach` admits facet `index` of side b at this distance, where a facet of side a has one of these unit `normals` and the
-    /// other one is its own. Note it if it is too far away.
+    /// Return whether `reach` admits facet `index` of side b at this distance, where a facet of side a has one of these
+    /// unit `normals` and the other one is its own. Note it if it is too far away.
     fn admits<const D: usize>(&mut self, reach: &Reach, index: usize, gap: f64, normals: [[f64; D]; 2]) -> bool {
         let faces = reach.faces(normals[0], normals[1]);
         if faces && gap > reach.gap {
@@ -188,12 +189,13 @@ impl<const D: usize> BoxTree<D> {
         self.tree.locate_in_envelope_intersecting(near).map(|candidate| candidate.data)
     }
 
-    /// Return the pieces of a facet of side a that `facing` makes of facets of side b, and note in `refused` why others are none.
+    /// Return the pieces of a facet of side a that `facing` makes of facets of side b, and note in `refused` why others
+    /// are none.
     ///
-    /// Facets that normals meet within twice the distance of the nearest one and the size of the facet are tried first, so that tilted surfaces
-    /// are found, too. If none of
-    /// them is a partner, those at any distance are. Where a partner ends, nothing farther away takes its place: means over a facet have no
-    /// meaning where distances jump by more than its size.
+    /// Facets that normals meet within twice the distance of the nearest one and the size of the facet are tried first,
+    /// so that tilted surfaces are found, too. If none of them is a partner, those at any distance are. Where a partner
+    /// ends, nothing farther away takes its place: means over a facet have no meaning where distances jump by more than
+    /// its size.
     fn pieces<P>(
         &self,
         facet: &Facet<D>,

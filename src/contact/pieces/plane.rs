@@ -6,8 +6,9 @@ use crate::contact::side::Side;
 use crate::fem::{element, length, minus};
 use crate::linalg::dot;
 
-/// Largest distance outside of the parameters of a facet at which a ray may meet it in the plane, where pieces end exactly where facets
-/// do. It is far above the rounding of a search and far below the spacing of integration points, so that it decides only at ends.
+/// Largest distance outside of the parameters of a facet at which a ray may meet it in the plane, where pieces end
+/// exactly where facets do. It is far above the rounding of a search and far below the spacing of integration points,
+/// so that it decides only at ends.
 const ON_FACET: f64 = 1e-6;
 
 /// Return the common pieces of two plane curves.
@@ -52,7 +53,8 @@ pub fn in_plane(a: &Side<2>, b: &Side<2>, reach: &Reach) -> Intersection<2> {
     common
 }
 
-/// Return the pieces of a facet of side a that face facets of side b, the nearest first. Note in `refused` why others are none.
+/// Return the pieces of a facet of side a that face facets of side b, the nearest first. Note in `refused` why others
+/// are none.
 fn facing(facet: &Facet<2>, b: &Side<2>, near: &[usize], reach: &Reach, refused: &mut Refused) -> Vec<FacetSegment> {
     let mut pieces: Vec<FacetSegment> = Vec::new();
     for &index in near {
@@ -122,13 +124,14 @@ impl FacetSegment {
         if dot(&a.direction, &b.direction) >= 0.0 {
             return Ok(None);
         }
-        // Between two neighbouring breaks the normals of a either all hit b or all miss it. The foot of an end of b behind the
-        // centre of the curve has no meaning, but an additional break does no harm.
+        // Between two neighbouring breaks the normals of a either all hit b or all miss it. The foot of an end of b
+        // behind the centre of the curve has no meaning, but an additional break does no harm.
         let offset = minus(b.from, a.from);
         let mut breaks = vec![0.0, 1.0];
         for &x in &b.x[..2] {
             let foot = match a.foot(plus(x, offset)) {
-                // normals turn by less than a right angle however far they are continued, so that some points have no foot
+                // normals turn by less than a right angle however far they are continued, so that some points have no
+                // foot
                 Err(Lost) if !Rays::of(a, [f64::INFINITY; 2]).may_meet(&[plus(x, b.from)]) => None,
                 found => found?,
             };

@@ -1,11 +1,11 @@
 //! Common pieces of two triangulated surfaces: convex polygons in the parameters of the facets of side a.
 //!
 //! The corners of a facet of side b are projected to the parameters of a facet of side a along the normals of a. The
-//! projection of a corner x solves x = x_a(u, v) + t n(u, v), where x_a is the facet of side a, n its normal, (u, v) are its
-//! parameters and t is the distance. The image of the facet of b is clipped by the facet of a. Its edges are taken as straight
-//! although they may be slightly curved. Each facet of a is still covered once, since neighbours in b share their edges. A
-//! curved facet of b is split into four at the middle of its edges. All facets of b are split further where corners of some
-//! have no image.
+//! projection of a corner x solves x = x_a(u, v) + t n(u, v), where x_a is the facet of side a, n its normal, (u, v)
+//! are its parameters and t is the distance. The image of the facet of b is clipped by the facet of a. Its edges are
+//! taken as straight although they may be slightly curved. Each facet of a is still covered once, since neighbours in b
+//! share their edges. A curved facet of b is split into four at the middle of its edges. All facets of b are split
+//! further where corners of some have no image.
 
 use super::facet::{Facet, Lost, Rays, SNAP, plus};
 use super::{BoxTree, IntegrationPoint, Intersection, Reach, Refused, WHOLE};
@@ -17,15 +17,17 @@ use crate::problem::order::Order;
 /// Area of a piece, as a share of its facet, up to which it is rounding.
 const TINY: f64 = 1e-11;
 
-/// Largest distance outside of its parameters at which a ray may meet a facet. The edge of a piece is a chord of the image of
-/// b's edge, which bows by an eighth of the angle that the normals turn along it: a tenth if they turn by a radian a facet.
+/// Largest distance outside of its parameters at which a ray may meet a facet. The edge of a piece is a chord of the
+/// image of b's edge, which bows by an eighth of the angle that the normals turn along it: a tenth if they turn by a
+/// radian a facet.
 const ON_FACET: f64 = 0.1;
 
-/// Numbers of parts into which the edges of facets of side b are split. They are tried one after the other, until a facet of side a is
-/// covered or each corner of the parts lies on one of its normals.
+/// Numbers of parts into which the edges of facets of side b are split. They are tried one after the other, until a
+/// facet of side a is covered or each corner of the parts lies on one of its normals.
 ///
-/// Beyond a curved facet its parabolas turn back, so that points farther away than about its size lie on none of its normals. The
-/// parts that cover the facet must be smaller than that. An eighth was enough on twelve parts of machines, five of which had lost pieces.
+/// Beyond a curved facet its parabolas turn back, so that points farther away than about its size lie on none of its
+/// normals. The parts that cover the facet must be smaller than that. An eighth was enough on twelve parts of machines,
+/// five of which had lost pieces.
 const PARTS: [usize; 4] = [1, 2, 4, 8];
 
 /// Return the common pieces of two surfaces in space.
@@ -79,7 +81,8 @@ fn without_overlaps(pieces: Vec<FacetPolygon>) -> Vec<FacetPolygon> {
     free
 }
 
-/// Return the pieces of a facet of side a that face these facets of side b, without what nearer ones cover. Note in `refused` why others are none.
+/// Return the pieces of a facet of side a that face these facets of side b, without what nearer ones cover. Note in
+/// `refused` why others are none.
 fn facing(facet: &Facet<3>, b: &[Facet<3>], near: &[usize], reach: &Reach, refused: &mut Refused) -> Vec<FacetPolygon> {
     let mut pieces = Vec::new();
     for parts in PARTS {
@@ -197,7 +200,8 @@ impl FacetPolygon {
 /// The parameters of the result of [`Facet::foot`].
 type Foot = Result<Option<[f64; 2]>, Lost>;
 
-/// Return the triangles between the points (i, j), i + j <= parts, of a triangle whose edges are split into so many parts.
+/// Return the triangles between the points (i, j), i + j <= parts, of a triangle whose edges are split into so many
+/// parts.
 fn triangles(parts: usize) -> Vec<[[usize; 2]; 3]> {
     let mut all = Vec::new();
     for j in 0..parts {
@@ -273,8 +277,8 @@ fn intersection(polygon: &[[f64; 2]], other: &[[f64; 2]]) -> Polygon {
     edges(other).fold(polygon.to_vec(), |part, (p, q)| left_of(&part, p, q))
 }
 
-/// Return the part of a convex polygon outside another, as convex polygons. Parts of an area up to `tiny` are dropped. If the
-/// intersection is no larger than that, the result is the whole polygon.
+/// Return the part of a convex polygon outside another, as convex polygons. Parts of an area up to `tiny` are dropped.
+/// If the intersection is no larger than that, the result is the whole polygon.
 fn difference(polygon: Polygon, other: &[[f64; 2]], tiny: f64) -> Vec<Polygon> {
     if area(&intersection(&polygon, other)) <= tiny {
         return vec![polygon];

@@ -52,18 +52,18 @@ pub(super) struct Patch<const D: usize> {
     terms: Vec<[f64; D]>,
 }
 
-/// Smallest pivot of a fit whose monomials have norm one. A pivot is the part of a monomial that the others do not represent. One
-/// over its square amplifies the rounding of sums, so that a fit has at least six digits of sixteen.
+/// Smallest pivot of a fit whose monomials have norm one. A pivot is the part of a monomial that the others do not
+/// represent. One over its square amplifies the rounding of sums, so that a fit has at least six digits of sixteen.
 const DETERMINED: f64 = 1e-5;
 
 impl<const D: usize> Patch<D> {
     /// Return the least-squares fit to the values `u` at nodes, or `None` if they do not determine it.
     ///
-    /// The error of the polynomial is the next term of Taylor's series. It grows with the distance to the power of the degree
-    /// plus one, and squared differences are divided by its square. So all nodes are weighted by what they determine, and distant
-    /// ones do not spoil the derivatives at the centre. A node in the centre is weighted like the nearest other one. Polynomials of a degree above three
-    /// are to be good on all of the cells that they are blended over, some of which may be much larger than others: there the farthest node counts
-    /// as near.
+    /// The error of the polynomial is the next term of Taylor's series. It grows with the distance to the power of the
+    /// degree plus one, and squared differences are divided by its square. So all nodes are weighted by what they
+    /// determine, and distant ones do not spoil the derivatives at the centre. A node in the centre is weighted like
+    /// the nearest other one. Polynomials of a degree above three are to be good on all of the cells that they are
+    /// blended over, some of which may be much larger than others: there the farthest node counts as near.
     pub fn fit(space: &Space<D>, u: &[f64], centre: [f64; D], nodes: &[u32], monomials: &Monomials) -> Option<Self> {
         let n = monomials.made.len();
         if nodes.len() < n {

@@ -1,4 +1,5 @@
-//! The products of the errors of two displacements of one body, cell by cell: of the solution, and of its influence on a force.
+//! The products of the errors of two displacements of one body, cell by cell: of the solution, and of its influence on
+//! a force.
 
 use super::{Recovery, lagrange};
 use crate::fem::element::{self, Rule};
@@ -12,12 +13,13 @@ const SINGULAR: f64 = 0.5;
 impl<const D: usize> Recovery<'_, D> {
     /// Return the product a(e, e') of the errors of this displacement and of another one in each cell.
     ///
-    /// Up to order two an error is the distance of the recovered from the discrete displacement, with quadratic elements that from the interpolant where the
-    /// product is smaller, as in [`Recovery::errors`].
+    /// Up to order two an error is the distance of the recovered from the discrete displacement, with quadratic
+    /// elements that from the interpolant where the product is smaller, as in [`Recovery::errors`].
     ///
-    /// Above order two, recovered polynomials miss nearly all of the error at singular places. There the highest parts u_k of the discrete displacements,
-    /// in orthogonal polynomials, tell the missing ones. A displacement r^mu has an energy error of k^-2mu (Babuska and Suri 1994), so that
-    /// the products of the parts n fall as n^-s with s = 2 mu + 2 mu' + 1, and those of all n > k are
+    /// Above order two, recovered polynomials miss nearly all of the error at singular places. There the highest parts
+    /// u_k of the discrete displacements, in orthogonal polynomials, tell the missing ones. A displacement r^mu has an
+    /// energy error of k^-2mu (Babuska and Suri 1994), so that the products of the parts n fall as n^-s with s = 2 mu +
+    /// 2 mu' + 1, and those of all n > k are
     ///
     /// ```text
     /// sum a(u_n, u'_n) = a(u_k, u'_k) (k + 1/2)/(s - 1) (1 + 1/(2k))^-s

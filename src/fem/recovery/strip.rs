@@ -1,8 +1,8 @@
 //! The strip of a body between straight facets and the smooth boundary through their vertices.
 //!
-//! Over a straight facet the boundary rises by delta = sum r_ij l_i l_j, with one rise r_ij for each edge and barycentric
-//! coordinates l_i. It is the surface of second degree through the vertices of the facet that is nearest to the vertices of the
-//! facets around it. Facets that meet at a corner have no influence on each other.
+//! Over a straight facet the boundary rises by delta = sum r_ij l_i l_j, with one rise r_ij for each edge and
+//! barycentric coordinates l_i. It is the surface of second degree through the vertices of the facet that is nearest to
+//! the vertices of the facets around it. Facets that meet at a corner have no influence on each other.
 
 use super::Recovery;
 use crate::fem::space::component;
@@ -11,13 +11,13 @@ use crate::linalg::dot;
 use crate::problem::order::Order;
 use nalgebra::{Matrix3, Vector3};
 
-/// Cosine of the angle, 40 degrees, at which facets meet in a corner. Gmsh uses the same angle where it makes surfaces of
-/// triangles (its tutorial t13). A circle of nine edges is still smooth.
+/// Cosine of the angle, 40 degrees, at which facets meet in a corner. Gmsh uses the same angle where it makes surfaces
+/// of triangles (its tutorial t13). A circle of nine edges is still smooth.
 const CORNER: f64 = 0.766;
 
-/// Smallest explained share of the sum of squared curvatures, which are heights of the vertices around a facet over squared
-/// distances. It is what a surface of second degree explains. On cylinders and spheres the rest is at most 0.02, with 38 degrees
-/// per facet. Beside the edge of a roof it is at least 0.23 in space and half in the plane.
+/// Smallest explained share of the sum of squared curvatures, which are heights of the vertices around a facet over
+/// squared distances. It is what a surface of second degree explains. On cylinders and spheres the rest is at most
+/// 0.02, with 38 degrees per facet. Beside the edge of a roof it is at least 0.23 in space and half in the plane.
 const EXPLAINED: f64 = 0.9;
 
 /// Straight facets with the rise of the boundary over their edges, in the order of [`EDGES`], positive outwards.
@@ -105,7 +105,8 @@ impl<'a, const D: usize> Around<'a, D> {
 
     /// Return the rises over the edges of facet `i`, or `None` if it is part of a plane or of no smooth surface.
     ///
-    /// The error of a height at the distance d is the next term of Taylor's series, d^3, so squares have the weight d^-6.
+    /// The error of a height at the distance d is the next term of Taylor's series, d^3, so squares have the weight
+    /// d^-6.
     fn rise(&self, i: usize) -> Option<Vector3<f64>> {
         let x = self.facets.coordinates(i, self.space);
         let (normal, dual) = (&self.normal[i], dual(&x));
@@ -132,8 +133,8 @@ impl<'a, const D: usize> Around<'a, D> {
         let least = 1e-6 * of.eigenvalues.max();
         let inverse = of.eigenvalues.map(|value| if value > least { 1.0 / value } else { 0.0 });
         let rise = of.eigenvectors * inverse.component_mul(&(of.eigenvectors.transpose() * right));
-        // Heights are compared as curvatures, so that the far side of the facet has weight. The vertices beside it alone do not
-        // distinguish a roof from a cylinder.
+        // Heights are compared as curvatures, so that the far side of the facet has weight. The vertices beside it
+        // alone do not distinguish a roof from a cylinder.
         let sum = |of: &dyn Fn(&Vector3<f64>, f64) -> f64| -> f64 {
             heights.iter().map(|(near, row, height)| (near * of(row, *height)).powi(2)).sum()
         };
@@ -143,14 +144,14 @@ impl<'a, const D: usize> Around<'a, D> {
 }
 
 impl<const D: usize> Recovery<'_, D> {
-    /// Add the residual of the strip between straight facets and the curved boundary to `residual`, one entry per dof. It is
-    /// `-int delta (sigma - sigma_nn) : grad v` along the facets for every shape function v, with the recovered stress sigma. Return the
-    /// energy `int |delta| sigma : eps` of the strip along the facets of each cell.
+    /// Add the residual of the strip between straight facets and the curved boundary to `residual`, one entry per dof.
+    /// It is `-int delta (sigma - sigma_nn) : grad v` along the facets for every shape function v, with the recovered
+    /// stress sigma. Return the energy `int |delta| sigma : eps` of the strip along the facets of each cell.
     ///
-    /// The strip is a part of the body that cells do not cover, and it carries sigma. The pressure -sigma_nn acts on the curve
-    /// and not on the facet; the difference of its work is that of div v in the strip. Other loads on the boundary, and body
-    /// forces, change less. The energy changes the work of the loads to first order, as does the squared energy error of a cell, so that
-    /// both have the same share in the error of displacements.
+    /// The strip is a part of the body that cells do not cover, and it carries sigma. The pressure -sigma_nn acts on
+    /// the curve and not on the facet; the difference of its work is that of div v in the strip. Other loads on the
+    /// boundary, and body forces, change less. The energy changes the work of the loads to first order, as does the
+    /// squared energy error of a cell, so that both have the same share in the error of displacements.
     pub(super) fn add_strip(&self, residual: &mut [f64]) -> Vec<f64> {
         let (strip, space) = (Strip::of(self.space), self.space);
         let (rule, mut energies) = (element::rule(D, 5), vec![0.0; space.cell_count()]);
@@ -189,8 +190,8 @@ fn products(l: &[f64]) -> Vector3<f64> {
     Vector3::from_fn(|k, _| if k < edges { l[EDGES[k].0] * l[EDGES[k].1] } else { 0.0 })
 }
 
-/// Return the gradients of the barycentric coordinates in the plane of a facet with these corners. That of the first is not
-/// computed.
+/// Return the gradients of the barycentric coordinates in the plane of a facet with these corners. That of the first is
+/// not computed.
 fn dual<const D: usize>(x: &[[f64; D]]) -> [[f64; D]; D] {
     let mut dual = [[0.0; D]; D];
     let a = minus(x[1], x[0]);

@@ -24,7 +24,8 @@ impl Coordinates {
     }
 }
 
-/// Return sine and cosine of an angle in degrees. They are exact at multiples of 90 degrees, where planes of symmetry are.
+/// Return sine and cosine of an angle in degrees. They are exact at multiples of 90 degrees, where planes of symmetry
+/// are.
 fn sine_cosine(degrees: f64) -> (f64, f64) {
     match degrees.rem_euclid(360.0) {
         0.0 => (0.0, 1.0),
@@ -54,8 +55,8 @@ impl LocalAxes {
         Self { origin: origin.into(), ..Self::default() }
     }
 
-    /// Return the axes with the first one from the origin to `first`, and `plane` in the half plane of the second one. None if the points lie on a
-    /// line.
+    /// Return the axes with the first one from the origin to `first`, and `plane` in the half plane of the second one.
+    /// None if the points lie on a line.
     pub fn by_plane(origin: [f64; 3], first: [f64; 3], plane: [f64; 3]) -> Option<Self> {
         let origin = Vector3::from(origin);
         let x = unit(Vector3::from(first) - origin)?;
@@ -63,7 +64,8 @@ impl LocalAxes {
         Some(Self { origin, axes: Matrix3::from_columns(&[x, z.cross(&x), z]) })
     }
 
-    /// Return the axes with the global third one, and `first` in the half plane of the first one. None if `first` is straight above the origin.
+    /// Return the axes with the global third one, and `first` in the half plane of the first one. None if `first` is
+    /// straight above the origin.
     pub fn about_third(origin: [f64; 3], first: [f64; 3]) -> Option<Self> {
         let level = [first[0], first[1], origin[2]];
         Self::by_plane(origin, level, [origin[0] - level[1] + origin[1], origin[1] + level[0] - origin[0], origin[2]])

@@ -111,7 +111,8 @@ impl LineReader {
         None
     }
 
-    /// Return the next keyword or data line. A keyword that ends with a comma goes on in the next line, if that has parameters.
+    /// Return the next keyword or data line. A keyword that ends with a comma goes on in the next line, if that has
+    /// parameters.
     pub fn next(&mut self) -> Option<(SourceLine, InputLine)> {
         let (at, line) = self.line()?;
         let Some(keyword) = line.strip_prefix('*') else { return Some((at, InputLine::Data(line))) };
@@ -177,9 +178,8 @@ pub fn count(word: &str) -> TextResult<u64> {
 
 /// Return the numbers of a data line. Empty ones are zero.
 pub fn reals(words: &[&str]) -> TextResult<Vec<f64>> {
-    let number = |word: &&str| match word.is_empty() {
-        true => Ok(0.0),
-        false => real(word).ok_or_else(|| format!("`{word}` is no number")),
+    let number = |word: &&str| {
+        if word.is_empty() { Ok(0.0) } else { real(word).ok_or_else(|| format!("`{word}` is no number")) }
     };
     words.iter().map(number).collect()
 }
@@ -195,12 +195,14 @@ pub fn coordinates(keyword: &Keyword) -> TextResult<Coordinates> {
     }
 }
 
-/// Return first and last number and step of a data line that generates a set. A file of so many `bytes` has no more of them.
+/// Return first and last number and step of a data line that generates a set. A file of so many `bytes` has no more of
+/// them.
 pub fn generated(set: &str, words: &[&str], bytes: usize) -> TextResult<[u64; 3]> {
     let [first, last] = [count(words[0])?, count(words.get(1).copied().unwrap_or(words[0]))?];
     let step = words.get(2).filter(|word| !word.is_empty()).map_or(Ok(1), |word| count(word))?.max(1);
-    match last.saturating_sub(first) / step >= bytes as u64 {
-        true => Err(format!("the set `{set}` has more members, from {first} to {last}, than the file has bytes")),
-        false => Ok([first, last, step]),
+    if last.saturating_sub(first) / step >= bytes as u64 {
+        Err(format!("the set `{set}` has more members, from {first} to {last}, than the file has bytes"))
+    } else {
+        Ok([first, last, step])
     }
 }

@@ -1,8 +1,8 @@
 //! Input files of Abaqus and CalculiX (`.inp`) in Gmsh's format 2.2: nodes, elements, and named sets.
 //!
-//! Element sets become groups of cells. Sets of shells, membranes and trusses become the groups of facets or edges of cells
-//! that these lie on. Surfaces are groups of facets, and node sets groups of points. Instances of parts are placed. Names are
-//! written in lower case. Characters that no name can have become `_`. Other keywords are skipped.
+//! Element sets become groups of cells. Sets of shells, membranes and trusses become the groups of facets or edges of
+//! cells that these lie on. Surfaces are groups of facets, and node sets groups of points. Instances of parts are
+//! placed. Names are written in lower case. Characters that no name can have become `_`. Other keywords are skipped.
 
 mod frame;
 mod lines;
@@ -29,8 +29,8 @@ pub struct Converted {
 /// Convert a file for a scene of this dimension.
 ///
 /// # Errors
-/// A line is not one of Abaqus or CalculiX. The file has no cells, or solids of other kinds. A set has members that do not
-/// exist. Errors name the line.
+/// A line is not one of Abaqus or CalculiX. The file has no cells, or solids of other kinds. A set has members that do
+/// not exist. Errors name the line.
 pub fn convert(path: &Path, bytes: &[u8], dimension: usize) -> Result<Converted> {
     let reader = Reader::read(path, bytes)?;
     let help = "an input file of Abaqus or CalculiX has them under *NODE and *ELEMENT";
@@ -51,8 +51,8 @@ pub fn convert(path: &Path, bytes: &[u8], dimension: usize) -> Result<Converted>
     })
 }
 
-/// Return the mesh. Each group is a physical one on an entity of its own, so that an element of several groups is written once for
-/// each.
+/// Return the mesh. Each group is a physical one on an entity of its own, so that an element of several groups is
+/// written once for each.
 fn contents(model: &AbaqusModel, groups: &[ElementGroup]) -> Contents {
     let mut contents =
         Contents { nodes: model.nodes.iter().map(|(tag, node)| (*tag, node.x)).collect(), ..Contents::default() };
@@ -139,9 +139,10 @@ impl<'a> GroupBuilder<'a> {
             surface.faces.iter().any(|(_, face)| *face == ElementFace::Free)
                 || surface.of_sets.iter().any(|(_, face)| *face == ElementFace::Free)
         };
-        let faces = match lower().next().is_some() || model.surfaces.values().any(is_free) {
-            true => CellFaces::new(model, dimension, lower().any(|kind| kind.shape.dimension == 1)),
-            false => CellFaces::new(model, 0, false),
+        let faces = if lower().next().is_some() || model.surfaces.values().any(is_free) {
+            CellFaces::new(model, dimension, lower().any(|kind| kind.shape.dimension == 1))
+        } else {
+            CellFaces::new(model, 0, false)
         };
         let mut groups = Self { model, lines, dimension, faces, list: Vec::new(), left_out: LeftOut::default() };
         groups.element_sets()?;
@@ -153,7 +154,8 @@ impl<'a> GroupBuilder<'a> {
         Ok(groups)
     }
 
-    /// Return the kind of an element if it is a cell. In a plane scene solids are, too: the reader of the mesh refuses them.
+    /// Return the kind of an element if it is a cell. In a plane scene solids are, too: the reader of the mesh refuses
+    /// them.
     fn cell(&self, element: &AbaqusElement) -> Option<AbaqusType> {
         element.kind.filter(|kind| kind.shape.dimension >= self.dimension)
     }
@@ -243,7 +245,8 @@ impl<'a> GroupBuilder<'a> {
         Ok(())
     }
 
-    /// Make a group of the facets, or else of the edges, that the elements of each set lie on, where the set has no cells.
+    /// Make a group of the facets, or else of the edges, that the elements of each set lie on, where the set has no
+    /// cells.
     fn facets_of_sets(&mut self) -> Result<()> {
         for name in self.model.element_sets.keys() {
             let tags = self.members(name)?;
@@ -388,8 +391,8 @@ impl<'a> CellFaces<'a> {
         faces.filter(is_free).collect()
     }
 
-    /// Return the face or edge of a cell that an element of lower dimension lies on, if there is one. Its nodes are those of
-    /// the cell, which may have middle nodes that the element does not have.
+    /// Return the face or edge of a cell that an element of lower dimension lies on, if there is one. Its nodes are
+    /// those of the cell, which may have middle nodes that the element does not have.
     fn under(&self, kind: AbaqusType, nodes: &[u64]) -> Option<TypedNodes> {
         match nodes {
             // Programs do not agree on the place of the middle node of a line.

@@ -99,8 +99,8 @@ impl Reader {
     /// Read a file and all that it includes.
     ///
     /// # Errors
-    /// A line is not one of Abaqus or CalculiX, or it is one that the program does not know and that changes the mesh. The
-    /// error names the file and the line.
+    /// A line is not one of Abaqus or CalculiX, or it is one that the program does not know and that changes the mesh.
+    /// The error names the file and the line.
     pub fn read(path: &Path, bytes: &[u8]) -> Result<Reader> {
         let mut reader = Reader { lines: LineReader::new(path, bytes), ..Reader::default() };
         let (mut data, mut last) = (DataLines::Other, SourceLine::default());
@@ -322,8 +322,8 @@ impl Reader {
 
     /// Read an element, or a part of it.
     ///
-    /// A line goes on in the next one after a comma. Where the number of nodes is known, it also goes on without a comma until all nodes are there, as
-    /// CalculiX reads it; then the lines must have exactly these nodes.
+    /// A line goes on in the next one after a comma. Where the number of nodes is known, it also goes on without a
+    /// comma until all nodes are there, as CalculiX reads it; then the lines must have exactly these nodes.
     fn element(&mut self, lines: &mut ElementLines, words: &[&str], ends: bool, at: SourceLine) -> TextResult<()> {
         let ElementLines { name, role, set, open, comma } = lines;
         let before = open.len();
@@ -416,7 +416,8 @@ impl Reader {
         Ok(())
     }
 
-    /// Read a line of `*SYSTEM`: the origin and a point on the first axis; then a point in the plane of the first two axes.
+    /// Read a line of `*SYSTEM`: the origin and a point on the first axis; then a point in the plane of the first two
+    /// axes.
     fn system(&mut self, points: &mut Vec<[f64; 3]>, numbers: &[f64]) -> TextResult<()> {
         if !matches!(numbers.len(), 3 | 6) {
             return Err("*SYSTEM has three numbers of each point: origin, first axis; then the second axis".into());
@@ -442,8 +443,9 @@ fn known(sets: &BTreeMap<String, Set>, prefix: &str, word: &str) -> TextResult<S
 
 /// Check the number of nodes behind the number of an element.
 fn check_count(kind: AbaqusType, open: &[u64]) -> TextResult<()> {
-    match open.len() == kind.nodes() + 1 {
-        true => Ok(()),
-        false => Err(format!("an element has {} nodes here, not {}", kind.nodes(), open.len() - 1)),
+    if open.len() == kind.nodes() + 1 {
+        Ok(())
+    } else {
+        Err(format!("an element has {} nodes here, not {}", kind.nodes(), open.len() - 1))
     }
 }

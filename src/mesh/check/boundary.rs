@@ -20,7 +20,8 @@ const TOUCH: f64 = 1e-9;
 /// facet.
 const PIECES: [&[[usize; 3]]; 2] = [&[[0, 1, 2]], &[[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]];
 
-/// Check that no node of the boundary lies on a facet to which it does not belong. `facets` are those of one cell alone.
+/// Check that no node of the boundary lies on a facet to which it does not belong. `facets` are those of one cell
+/// alone.
 ///
 /// # Errors
 /// A node lies on such a facet. The error gives the place and the cells.

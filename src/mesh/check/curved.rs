@@ -14,8 +14,8 @@ use nalgebra::DMatrix;
 use std::collections::HashSet;
 use std::sync::OnceLock;
 
-/// Share of the largest coefficient of a Jacobian below which a value is rounding. The Jacobian is zero where a cell is flat at
-/// a corner, as at the end of two edges that touch each other.
+/// Share of the largest coefficient of a Jacobian below which a value is rounding. The Jacobian is zero where a cell is
+/// flat at a corner, as at the end of two edges that touch each other.
 const ROUNDING: f64 = 1e-9;
 
 /// Check the nodes inside the edges of a body and the Jacobians of its curved cells.
@@ -76,14 +76,15 @@ fn is_folded(x: &[[f64; 3]], dimension: usize) -> bool {
 /// Bernstein's basis for the maps of simplices of one order and dimension.
 ///
 /// With the control points b of degree k, the derivative along the edge 0a has the control points k (b_(p+e_a) -
-/// b_(p+e_0)), where p are powers of degree k - 1. A coefficient of a product of polynomials is the mean of the products
-/// of theirs, with multinomial weights.
+/// b_(p+e_0)), where p are powers of degree k - 1. A coefficient of a product of polynomials is the mean of the
+/// products of theirs, with multinomial weights.
 struct Bernstein {
     /// Matrix from the points of the simplex to its control points.
     control: DMatrix<f64>,
     /// For all powers p: the control points p + e_0, p + e_1, ...
     raised: Vec<Vec<usize>>,
-    /// For each product of derivatives along 01, 02 and in space 03: their powers p, the coefficient and the weight there.
+    /// For each product of derivatives along 01, 02 and in space 03: their powers p, the coefficient and the weight
+    /// there.
     products: Vec<([usize; 3], usize, f64)>,
 }
 
@@ -163,9 +164,10 @@ impl Bernstein {
 }
 
 impl<const D: usize> Mesh<D> {
-    /// Make the edges of all folded cells straight until no cell is folded, and count the cells in [`Mesh::straightened`].
-    /// Neighbours share the edges, so a straight edge may fold another cell, which becomes straight in the next pass. A node moves once: one that serves
-    /// two edges, as with a wrong node number, would move for ever. The checks report it.
+    /// Make the edges of all folded cells straight until no cell is folded, and count the cells in
+    /// [`Mesh::straightened`]. Neighbours share the edges, so a straight edge may fold another cell, which becomes
+    /// straight in the next pass. A node moves once: one that serves two edges, as with a wrong node number, would move
+    /// for ever. The checks report it.
     pub fn straighten(&mut self) {
         if self.order == Order::P1 {
             return;
@@ -291,8 +293,8 @@ mod tests {
         assert!(counts.iter().all(|&count| count > 30), "{counts:?}");
     }
 
-    /// Return two quadratic triangles on the square of four corners. The mid-edge node of the bottom is at the height `bottom`.
-    /// The one of the diagonal is moved by `bent` towards the lower corner.
+    /// Return two quadratic triangles on the square of four corners. The mid-edge node of the bottom is at the height
+    /// `bottom`. The one of the diagonal is moved by `bent` towards the lower corner.
     fn square(bottom: f64, bent: f64) -> Mesh<2> {
         let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
         let middles = [[0.5, bottom], [1.0, 0.5], [0.5 + bent, 0.5 - bent], [0.5, 1.0], [0.0, 0.5]];

@@ -22,8 +22,8 @@ pub struct Cells<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> Cells<'a, D> {
-    /// Number the nodes of the body of this group, `stride` per cell, in order of first appearance in the cells. `node` holds
-    /// [`NONE`] for every point before, and the nodes of the body's points afterwards.
+    /// Number the nodes of the body of this group, `stride` per cell, in order of first appearance in the cells. `node`
+    /// holds [`NONE`] for every point before, and the nodes of the body's points afterwards.
     pub fn new(mesh: &'a Mesh<D>, group: &'a Group, stride: usize, node: &mut [u32]) -> Self {
         let (mut points, mut nodes) = (Vec::new(), Vec::with_capacity(group.len() * stride));
         for &point in group.simplices().flat_map(|cell| &cell[..stride]) {
@@ -91,8 +91,8 @@ pub fn refuse<const D: usize>(mesh: &Mesh<D>, group: &Group, what: String, eleme
     }
 }
 
-/// Check that at most two cells share a face, that they lie on its two sides, and that they have the same nodes between its
-/// corners.
+/// Check that at most two cells share a face, that they lie on its two sides, and that they have the same nodes between
+/// its corners.
 ///
 /// # Errors
 /// A face violates this. The error gives the place and the cells.

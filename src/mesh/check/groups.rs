@@ -37,9 +37,9 @@ impl<'a> InUse<'a> {
         Self { group, duty, found: vec![Relation::default(); group.len()] }
     }
 
-    /// Compare the group with a body. `other` tells that the group does not serve this body. Only supports are compared with
-    /// such a body: a support may constrain a part of its group, and the rest may lie on other bodies. `node` holds the body's
-    /// node of each point.
+    /// Compare the group with a body. `other` tells that the group does not serve this body. Only supports are compared
+    /// with such a body: a support may constrain a part of its group, and the rest may lie on other bodies. `node`
+    /// holds the body's node of each point.
     pub fn compare<const D: usize>(&mut self, cells: &Cells<D>, faces: &Faces<D>, node: &[u32], other: bool) {
         let dimension = self.group.dimension;
         if other && self.duty == Duty::Acts {
@@ -85,8 +85,8 @@ impl<'a> InUse<'a> {
         edges
     }
 
-    /// Refuse a group that has a simplex twice, serves in part only, or has simplices that lie across its bodies. A group that
-    /// touches no body is left to the caller, which reports the line of the scene that names it.
+    /// Refuse a group that has a simplex twice, serves in part only, or has simplices that lie across its bodies. A
+    /// group that touches no body is left to the caller, which reports the line of the scene that names it.
     pub fn judge<const D: usize>(&self, mesh: &Mesh<D>) -> Result<()> {
         if let Some(twice) = self.twice() {
             return Err(self.refuse(mesh, twice, "stands twice in it", "mesh the geometry again"));

@@ -7,9 +7,9 @@
 //! 5. Bodies have nodes of their own.
 //! 6. The facets of groups in use bound the bodies that they serve ([`groups`]).
 //!
-//! Facets that cross each other are not looked for, nor parts that were meshed again inside other ones: no mesher makes them. No check can tell
-//! whether a point of the boundary is where the user wants it. All costs are linear in the number of cells, except for that of the search tree of
-//! the boundary.
+//! Facets that cross each other are not looked for, nor parts that were meshed again inside other ones: no mesher makes
+//! them. No check can tell whether a point of the boundary is where the user wants it. All costs are linear in the
+//! number of cells, except for that of the search tree of the boundary.
 
 mod boundary;
 mod curved;
@@ -56,9 +56,9 @@ pub struct BodyCheck {
 }
 
 impl<const D: usize> Mesh<D> {
-    /// Check these bodies with the groups that serve them. `contacts` names groups that serve any body. With `shared`, bodies
-    /// may have nodes in common. Names that are not groups of the mesh are skipped, because the caller knows where they stand
-    /// in the scene.
+    /// Check these bodies with the groups that serve them. `contacts` names groups that serve any body. With `shared`,
+    /// bodies may have nodes in common. Names that are not groups of the mesh are skipped, because the caller knows
+    /// where they stand in the scene.
     ///
     /// # Errors
     /// A group of cells is not a mesh of a body. The error gives the body, the place and the elements.

@@ -35,13 +35,14 @@ fn classes<const D: usize>(cells: &Cells<D>, faces: &Faces<D>) -> (usize, Vec<u3
     joined.classes()
 }
 
-/// Largest difference of coordinates that count as equal in the order of parts, as a share of the size of their group. Files with
-/// eight characters for a number (`.bdf`) have six digits.
+/// Largest difference of coordinates that count as equal in the order of parts, as a share of the size of their group.
+/// Files with eight characters for a number (`.bdf`) have six digits.
 const ALIKE: f64 = 1e-6;
 
 impl<const D: usize> Mesh<D> {
-    /// Add the parts of a group of cells that are connected by facets as groups `NAME_1`, `NAME_2`, ... They are in the order of
-    /// x, then y, then z of the middle of their boxes. Parts with one middle are in the order of the sizes of their boxes.
+    /// Add the parts of a group of cells that are connected by facets as groups `NAME_1`, `NAME_2`, ... They are in the
+    /// order of x, then y, then z of the middle of their boxes. Parts with one middle are in the order of the sizes of
+    /// their boxes.
     ///
     /// # Errors
     /// The mesh has a group of such a name already; the error is the name.
@@ -73,8 +74,8 @@ fn middle<const D: usize>(cells: &Cells<D>, members: &[u32]) -> [f64; 6] {
     std::array::from_fn(|k| if k < 3 { 0.5 * (low[k] + high[k]) } else { high[k - 3] - low[k - 3] })
 }
 
-/// Sort the indices `order` by their keys from entry `from` on. Entries that a chain of differences of at most `alike` connects
-/// count as equal.
+/// Sort the indices `order` by their keys from entry `from` on. Entries that a chain of differences of at most `alike`
+/// connects count as equal.
 fn arrange(order: &mut [usize], keys: &[[f64; 6]], alike: f64, from: usize) {
     if from == 6 {
         return order.sort_unstable();

@@ -1,5 +1,6 @@
-//! Readers on damaged files: bytes of small valid files of each format are changed at random. A reader gives a mesh that keeps its
-//! promises, or an error with words; it never panics. `WINKLER_MUTATIONS` sets the number of files of each seed.
+//! Readers on damaged files: bytes of small valid files of each format are changed at random. A reader gives a mesh
+//! that keeps its promises, or an error with words; it never panics. `WINKLER_MUTATIONS` sets the number of files of
+//! each seed.
 
 use crate::mesh::{Asked, Duty, Mesh, MeshProducer, abaqus, parse};
 use std::path::Path;

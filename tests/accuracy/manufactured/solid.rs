@@ -76,9 +76,12 @@ impl Solid {
                 let constants: Vec<String> = names
                     .iter()
                     .zip(moduli)
-                    .map(|(name, value)| match name.starts_with("nu") {
-                        true => format!("{name} = {value}"),
-                        false => format!("{name} = {}", scaled(value)),
+                    .map(|(name, value)| {
+                        if name.starts_with("nu") {
+                            format!("{name} = {value}")
+                        } else {
+                            format!("{name} = {}", scaled(value))
+                        }
                     })
                     .collect();
                 format!("orthotropic = {{ {} }}\naxes = {{ angle = {angle}, axis = [0, 0, 1] }}", constants.join(", "))
