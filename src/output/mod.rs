@@ -4,6 +4,7 @@
 //! function that writes to an `out` returns the errors of that writer.
 
 mod axis;
+pub mod closing;
 mod fields;
 pub mod folder;
 mod mark;
@@ -14,14 +15,14 @@ pub mod terminal;
 pub mod views;
 pub mod vtu;
 
+pub use closing::{UNSETTLED, UnitWords, warning_lines};
 pub use fields::{BodyField, CellKind, FieldArray, LargestStress, UnstructuredGrid};
 pub use folder::{Folder, make_folder, refuse_foreign, safe_name, write_whole};
 pub use mark::{Mark, Role};
 pub use plot::{Color, Plot, PlotAxis, Series, Style};
 pub use report::{
     BalanceReport, BodyReport, EstimateReport, Extent, ForceReport, InnerTimes, IntervalReport, LISTED, ObstacleReport,
-    PairReport, ReactionReport, Report, RoundReport, StepPairReport, StepReport, TensionReport, UNSETTLED, UnitWords,
-    UnmetReport, busiest, warning_lines,
+    PairReport, ReactionReport, Report, RoundReport, StepPairReport, StepReport, TensionReport, UnmetReport, busiest,
 };
 pub use tables::{ContactTable, HistoryWriter, PairRow, ResultNames, RowFile, StepTable};
 pub use terminal::IterationTable;

@@ -11,7 +11,7 @@ use crate::fem::displacement::{self, Strained};
 use crate::fem::{length, minus};
 use crate::linalg::{around, bounds};
 use crate::model::{Body, BodySlot, Field};
-use crate::output::report::readable;
+use crate::output::closing::readable;
 use crate::output::{
     BalanceReport, BodyReport, Extent, ForceReport, LargestStress, ObstacleReport, ReactionReport, ResultNames,
     StepPairReport, StepReport, TensionReport, sci,

@@ -7,7 +7,7 @@ use crate::contact::ContactPair;
 use crate::ddm::{Outcome, Status};
 use crate::error::Kind;
 use crate::model::{Mechanism, Model, NamedMotion};
-use crate::output::report::readable;
+use crate::output::closing::readable;
 use crate::output::{StepReport, sci};
 use crate::problem::ContactSpec;
 

@@ -11,7 +11,7 @@ use crate::estimate::{Cause, Estimate, softness};
 use crate::fem::{length, minus};
 use crate::linalg;
 use crate::model::Mechanism;
-use crate::output::report::{DIGITS, place, readable};
+use crate::output::closing::{DIGITS, place, readable};
 use crate::output::{BalanceReport, StepPairReport, sci};
 use crate::petsc::Session;
 use crate::problem::ContactSpec;
