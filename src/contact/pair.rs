@@ -7,7 +7,7 @@ use super::pieces::{Intersection, WHOLE};
 use super::side::{FaceNode, ROUNDING, Side, along};
 use crate::error::{Error, Result};
 use crate::fem::element::{self, Rule};
-use crate::fem::{Frame, NodeDofs, Space, area_vector, cross, length, pad};
+use crate::fem::{Frame, Space, area_vector, cross, length, pad};
 use crate::linalg::{Csr, dot};
 use crate::problem::order::Order;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -420,15 +420,15 @@ impl ContactPair {
         entries.chunk_by(|p, q| p.0 / D == q.0 / D).map(of_node).collect()
     }
 
-    /// Replace the unit normals at all points, and with them the rows of both sides.
-    pub fn turn<const D: usize>(&mut self, normal: &[[f64; D]], sides: [NodeDofs<D>; 2]) {
-        for (index, NodeDofs { space, frame, prescribed }) in sides.into_iter().enumerate() {
+    /// Replace the unit normals at all points, and with them the rows of the displacements of nodes on both sides.
+    /// [`ContactPair::hold`] then makes the rows of dofs.
+    pub fn turn<const D: usize>(&mut self, normal: &[[f64; D]], spaces: [&Space<D>; 2]) {
+        for (index, space) in spaces.into_iter().enumerate() {
             let shares: Vec<Vec<(u32, f64)>> = (0..self.len()).map(|q| self.shares::<D>(index, q)).collect();
             self.nodal[index] = Csr::new(space.dofs());
             self.resultant[index].clear();
             self.moment[index].clear();
             shares.into_iter().zip(normal).for_each(|(shares, n)| push_rows(self, index, space, shares, *n));
-            self.hold(index, frame, prescribed);
         }
         self.normal = normal.iter().map(|&n| pad(n)).collect();
         self.is_turned = true;

@@ -4,7 +4,7 @@
 use super::law::LawMaker;
 use super::mirror::Mirrors;
 use crate::error::Result;
-use crate::fem::{Facets, Frame, NodeDofs, Space, area_vector, element, length, minus, unit};
+use crate::fem::{Facets, Frame, Space, area_vector, element, length, minus, unit};
 use crate::linalg::{DisjointSets, axpy, bounds, dot};
 use crate::mesh::datum;
 use crate::problem::order::Order;
@@ -166,11 +166,6 @@ impl<'a, const D: usize> Side<'a, D> {
         let normal = |k: usize| self.nodes[on[k] as usize].normal;
         let pairs = (0..on.len()).flat_map(|k| (0..k).map(move |l| (k, l)));
         pairs.map(|(k, l)| (length(minus(normal(k), normal(l))), length(minus(x[k], x[l])))).collect()
-    }
-
-    /// Return how the nodes move with the dofs of the body.
-    pub fn dofs(&self) -> NodeDofs<'a, D> {
-        NodeDofs { space: self.space, frame: self.frame, prescribed: self.prescribed }
     }
 
     /// Return the indices in `nodes` of the nodes of facet `i`.

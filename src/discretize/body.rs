@@ -5,7 +5,7 @@ use super::owned::OwnedDofs;
 use super::supports::Constraints;
 use crate::exchange::Plain;
 use crate::fem::interpolation::{coarse_nodes, from_vertices};
-use crate::fem::{NodalBlock, NodalForces, NodeDofs, NodeGraph, PointExtent, Prolongation, RigidMotion, Space, rigid};
+use crate::fem::{NodalBlock, NodalForces, NodeGraph, PointExtent, Prolongation, RigidMotion, Space, rigid};
 use crate::linalg::{Blocks, Csr, dot};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -63,11 +63,6 @@ impl<const D: usize> BodyMesh<D> {
     /// Return the coupling of the nodes by K, which is computed when it is first requested.
     pub fn graph(&self) -> &NodeGraph {
         self.graph.get_or_init(|| NodeGraph::with_rows(&self.space, &self.rows, &self.held.frame))
-    }
-
-    /// Return how the nodes move with the dofs.
-    pub fn node_dofs(&self) -> NodeDofs<'_, D> {
-        NodeDofs { space: &self.space, frame: &self.held.frame, prescribed: &self.held.prescribed }
     }
 
     /// Return the displacements of all dofs in a rigid motion.

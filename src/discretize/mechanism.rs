@@ -18,6 +18,7 @@ use crate::fem::{PointExtent, RigidMotion, length, minus, rigid, unit};
 use crate::linalg::{Blocks, DisjointSets, PART, TOLERANCE, axpy, dot, fit};
 use crate::model::Mechanism;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use std::collections::BTreeSet;
 
 /// Least value of [`MechanismSearch::lack`]: forces in equilibrium that people write have three digits or more.
 const LACKING: f64 = 1e-3;
@@ -208,23 +209,26 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
     /// all directions, as those of two discs that turn for themselves nearly do, the direction is that of least
     /// displacement.
     fn turn_normals(&mut self) {
-        if self.fixed.is_empty() {
-            return;
-        }
-        for number in 0..self.pairs.len() {
+        let leaning: Vec<usize> = (0..self.pairs.len()).filter(|&i| !self.pairs[i].spread.is_empty()).collect();
+        let mut turned = BTreeSet::new();
+        for number in leaning {
             let pair = &self.pairs[number];
             let motions: Vec<&GroupMotion<D>> = self.fixed.iter().filter(|moving| self.slides(moving, pair)).collect();
-            if motions.is_empty() || pair.spread.is_empty() {
+            if motions.is_empty() {
                 continue;
             }
             let normal: Vec<[f64; D]> = (0..pair.len()).map(|q| self.across(&motions, pair, q)).collect();
             // an obstacle has the rows of the surface before it until it is a rigid part
             let [a, b] = pair.bodies;
-            let dofs =
-                [a, if b < self.bodies.len() { b } else { a }].map(|body| self.bodies[body].part.mesh.node_dofs());
-            self.pairs[number].turn(&normal, dofs);
+            let meshes = [a, if b < self.bodies.len() { b } else { a }].map(|body| &self.bodies[body].part.mesh);
+            let pair = &mut self.pairs[number];
+            pair.turn(&normal, meshes.map(|mesh| &*mesh.space));
+            for (side, mesh) in meshes.into_iter().enumerate() {
+                pair.hold(side, &mesh.held.frame, &mesh.held.prescribed);
+            }
+            turned.extend([a, b]);
         }
-        for body in self.bodies.iter_mut() {
+        for (_, body) in self.bodies.iter_mut().enumerate().filter(|(number, _)| turned.contains(number)) {
             body.collect_rows(self.pairs);
             body.find_motions();
         }
@@ -355,18 +359,15 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
             spans.push((rigid::sum(&whole, &DVector::from_vec(amounts)), moving.amounts.clone()));
         }
         let bodies = &set[0].bodies;
-        let spans = rigid::apart(spans);
+        let mut spans = rigid::apart(spans);
         let shifts = rigid::to_common_point(&spans.iter().map(|(motion, _)| motion).collect::<Vec<_>>());
-        let shifted = |((motion, amounts), shift): ((RigidMotion<D>, DVector<f64>), [f64; D])| {
-            let parts = (0..D).filter(|&c| shift[c] != 0.0).map(|c| shift[c] * self.as_group(bodies, &whole[c]));
-            (motion, parts.fold(amounts, |sum, part| sum + part))
-        };
-        spans
-            .into_iter()
-            .zip(shifts)
-            .map(shifted)
-            .map(|(motion, amounts)| (motion.in_words(), self.moving(amounts)))
-            .collect()
+        for (span, shift) in spans.iter_mut().zip(shifts) {
+            let (_, amounts) = span;
+            for c in (0..D).filter(|&c| shift[c] != 0.0) {
+                *amounts += shift[c] * self.as_group(bodies, &whole[c]);
+            }
+        }
+        spans.into_iter().map(|(motion, amounts)| (motion.in_words(), self.moving(amounts))).collect()
     }
 
     /// Return the amounts of one motion of several bodies, as near as the motions that supports leave come to it.

@@ -6,7 +6,7 @@ use super::assembly::Factory;
 use super::bodies::parts;
 use super::body::BodyMesh;
 use super::facts::BodyInfo;
-use super::kept::{Kept, MatrixInputs};
+use super::kept::{EarlierPair, Kept, MatrixInputs};
 use super::pairs::{self, Contact, ContactFacts, Contacts};
 use super::partition::Partition;
 use super::verify::Verified;
@@ -104,7 +104,7 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     ranks: usize,
     factory: &mut F,
     kept: &mut Kept<D>,
-    pairs: Vec<(ContactPair, ContactFacts)>,
+    pairs: Vec<EarlierPair>,
 ) -> Result<(ReplicatedProblem<D, F::SolverPlan>, WholeProblem<'a, D>)> {
     let Request { scene, verified, cut, keep } = *request;
     let mesh = &verified.mesh;

@@ -18,11 +18,11 @@
 //! displacement differs from the constraint. In v every support is a prescribed dof, and the blocks of K keep their
 //! size.
 
-use super::{Space, cross, length, minus, pad, unit};
+use super::{cross, length, minus, pad, unit};
 use crate::exchange::Plain;
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 
 /// A row of blocks: for each node of the row its matrix.
 pub type Row<const D: usize> = Vec<(u32, SMatrix<f64, D, D>)>;
@@ -41,16 +41,6 @@ pub struct Frame<const D: usize> {
 /// Return the position of a node in a sorted slice.
 pub fn place(nodes: &[u32], node: u32) -> Option<u32> {
     nodes.binary_search(&node).ok().map(|place| place as u32)
-}
-
-/// How the nodes of a body move with its dofs.
-#[derive(Debug, Clone, Copy)]
-pub struct NodeDofs<'a, const D: usize> {
-    pub space: &'a Space<D>,
-    /// Dofs of nodes with rotated axes and of tied nodes.
-    pub frame: &'a Frame<D>,
-    /// Values of the prescribed dofs.
-    pub prescribed: &'a HashMap<usize, f64>,
 }
 
 impl<const D: usize> Frame<D> {

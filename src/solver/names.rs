@@ -56,7 +56,8 @@ pub(super) fn is_control_of_mumps(bare: &str) -> bool {
 const KSP_TYPES: &str = "cg fcg pipecg groppcg minres gmres fgmres bcgs richardson chebyshev preonly";
 const PC_TYPES: &str = "cholesky lu icc ilu hypre gamg mg jacobi pbjacobi bjacobi sor asm none";
 
-/// Return the object, KSP or PC, of which an option names the type, also in a nested solver; `None` for other options.
+/// Return `KSP` or `PC` if an option sets the type of such an object, which may be inside another solver. The result is
+/// `None` for other options.
 pub(super) fn object_of_type(name: &str) -> Option<&'static str> {
     [("ksp_type", "KSP"), ("pc_type", "PC")].into_iter().find_map(|(leaf, object)| nest_of(name, leaf).map(|_| object))
 }
