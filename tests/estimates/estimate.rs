@@ -203,6 +203,33 @@ fn a_load_that_bends_within_an_element() {
     }
 }
 
+/// A nearly incompressible body: recovered displacements have a dilatation that its bulk modulus amplifies, and the solution has none.
+#[test]
+fn a_nearly_incompressible_body() {
+    let solved = |n: usize| {
+        let mut all = sets(2, n);
+        let load = "body.upper.load.0.pressure=\"20 + 15*cos(2*pi*x)\"";
+        all.extend(["contact.0.gap=0", "body.lower.poisson=0.4999", load].map(str::to_owned));
+        solve_with(case("wavy"), &all)
+    };
+    let fine = solved(64).contact();
+    for n in [4, 8] {
+        let run = solved(n);
+        let table = run.contact();
+        let (mut error, mut whole) = (0.0, 0.0);
+        for q in 0..table.rows() {
+            let place = (0..fine.rows()).find(|&k| (fine["x"][k] - table["x"][q]).abs() < 1e-9);
+            let place = place.expect("nodes of a mesh are nodes of a finer one");
+            for column in ["u_n_lower", "u_n_upper"] {
+                error += table["weight"][q] * (table[column][q] - fine[column][place]).powi(2);
+                whole += table["weight"][q] * fine[column][place].powi(2);
+            }
+        }
+        let estimated = run.number("discretization_error/displacement");
+        is_effective(estimated, f64::sqrt(error / whole), &format!("n = {n}"));
+    }
+}
+
 /// Relative root of mean squares of differences of the pressures from `exact` at some points, by their weights.
 fn weighted_error(table: &Table, points: impl Iterator<Item = usize> + Clone, exact: impl Fn(usize) -> f64) -> f64 {
     let sum = |value: &dyn Fn(usize) -> f64| points.clone().map(|q| table["weight"][q] * value(q).powi(2)).sum::<f64>();
