@@ -6,10 +6,11 @@
 //! are distributed over ranks, each rank owns some rows. Where whole bodies live on several ranks, as condensed ones
 //! do, every rank has the whole matrix and solves for itself.
 
-use super::border::{self, Border, BorderMotion};
 use super::coarse::RigidSpace;
+use super::field::add_forces;
 use super::linear::{Failure, LinearResult, LinearSolution, LinearStep, StoppingTest, System, Trial};
-use super::{BodySlot, Distribution, Dofs, Field, Model};
+use super::rigid_parts::{ACCURACY, RigidParts, WithoutRigidParts};
+use super::{BodySlot, Distribution, Dofs, Field, Model, closing};
 use crate::error::{Error, Kind, Result};
 use crate::exchange::all_gather;
 use crate::linalg::{Csr, axpy, countable, dot};
@@ -26,7 +27,7 @@ use std::ops::Range;
 /// matrix is factored, some dofs of each body are *pins*, as many as it has free motions. Its displacements are v + E
 /// a, v is zero at the pins, and a stands in their place among the unknowns. Since K E = 0, the rows of K for a are
 /// zero, exactly, and a contact row has B E there. All dofs of a rigid part are pins. A matrix of complete nodes has no
-/// rigid parts: they are eliminated around it ([`border`]).
+/// rigid parts: they are eliminated around it ([`RigidParts`]).
 pub struct JointStep {
     matrix: SpringMatrix,
     /// B of all bodies: one row [B_a B_b] for each contact point, also for those of other ranks.
@@ -45,10 +46,8 @@ pub struct JointStep {
     earlier: BodyCounts,
     /// Traces of the motions of rigid parts that the matrix has, one list a part.
     rigid: Vec<Vec<Vec<f64>>>,
-    /// Motions of rigid parts that the matrix does not have.
-    motions: Vec<BorderMotion>,
-    /// Their elimination for the springs of the last solve.
-    border: Option<Border>,
+    /// The rigid parts that the matrix does not have, for the springs of the last solve.
+    parts_apart: Option<RigidParts>,
 }
 
 impl JointStep {
@@ -82,10 +81,9 @@ impl JointStep {
         let row_stiffness = side_a.iter().zip(side_b).map(|(a, b)| a + b).collect();
         let matrix = SpringMatrix::new(rows_of(stiffness, start)?, &rows, row_stiffness, coarse, make)?;
         let is_redundant = !of_nodes && model.exchange.ranks() > 1;
-        let motions = if of_nodes { border::motions(model) } else { Vec::new() };
         let rigid = if of_nodes { Vec::new() } else { rigid_traces(model) };
-        let (has_stiffness, earlier, border) = (of_nodes, BodyCounts::default(), None);
-        Ok(Self { matrix, rows, offset, pins, first, is_redundant, has_stiffness, earlier, rigid, motions, border })
+        let (has_stiffness, earlier, parts_apart) = (of_nodes, BodyCounts::default(), None);
+        Ok(Self { matrix, rows, offset, pins, first, is_redundant, has_stiffness, earlier, rigid, parts_apart })
     }
 
     /// Solve G x = r with the matrix until `enough` accepts an iterate. Return the estimated energy norm of the error
@@ -108,53 +106,19 @@ impl JointStep {
         Ok(failure.map_or(Ok(last_error), Err))
     }
 
-    /// Return B' `force` in the rows of this rank, for forces at the points, n.
-    fn pull(&self, force: &[f64], length: usize) -> Vec<f64> {
-        let mut pull = vec![0.0; length];
-        for (q, force) in force.iter().enumerate() {
-            let owned = self.rows.row(q).filter_map(|(i, b)| Some((i.checked_sub(self.first)?, b)));
-            owned.filter(|(i, _)| *i < length).for_each(|(i, b)| pull[i] += force * b);
-        }
-        pull
-    }
-
-    /// Eliminate the rigid parts around the matrix, which has these springs. Return why the solver gave up, if it did.
-    fn make_border(&mut self, model: &Model, springs: &[f64]) -> Result<Option<String>> {
-        if self.motions.is_empty() || self.border.as_ref().is_some_and(|border| border.springs == springs) {
+    /// Bring the rigid parts around the matrix to its springs. Return why a solver gave up, if it did.
+    fn update_parts(&mut self, model: &mut Model, springs: &[f64]) -> Result<Option<Failure>> {
+        if !self.has_stiffness {
             return Ok(None);
         }
-        let (motions, length) = (std::mem::take(&mut self.motions), self.offset[self.offset.len() - 1]);
-        let mut before = self.border.take().map_or(Vec::new(), |border| border.columns).into_iter();
-        let mut border = Border::new(&motions, springs);
-        for (k, motion) in motions.iter().enumerate() {
-            let load = self.pull(&border.forces[k], length);
-            // the column for the springs before is near
-            let mut column = before.next().unwrap_or_else(|| vec![0.0; length]);
-            let (closing, known) = closing_and_energy(model, &self.rows, self.first, &column, &load);
-            let held: Vec<f64> = closing.iter().zip(springs).map(|(closing, spring)| closing * spring).collect();
-            let (mut rest, mut product) = (load.clone(), self.pull(&held, length));
-            axpy(-1.0, &product, &mut rest);
-            self.matrix.multiply_stiffness(&self.rows, &column, &mut product);
-            axpy(-1.0, &product, &mut rest);
-            let is_enough = |trial: &Trial| trial.error <= border::ACCURACY * (known + trial.energy).sqrt();
-            let mut change = vec![0.0; length];
-            let last_error = match self.solve_matrix(model, &rest, &mut change, &mut |_, trial| is_enough(trial))? {
-                Ok(last_error) => last_error,
-                Err(reason) => {
-                    self.motions = motions;
-                    return Ok(Some(reason));
-                }
-            };
-            axpy(1.0, &change, &mut column);
-            let (closing, energy) = closing_and_energy(model, &self.rows, self.first, &column, &load);
-            let error = last_error.unwrap_or(self.matrix.solver().accuracy() * energy.sqrt());
-            self.matrix.multiply_stiffness(&self.rows, &column, &mut product);
-            border.push(model, motion, (column, &product), &closing, error);
-        }
-        self.motions = motions;
-        let is_factored = border.factor();
-        self.border = Some(border);
-        Ok((!is_factored).then(|| "nothing resists a motion of a rigid part".to_owned()))
+        let known = self.parts_apart.take();
+        self.parts_apart = match RigidParts::update(known, self, model, springs)? {
+            Ok(parts) => parts,
+            Err(failure) => return Ok(Some(failure)),
+        };
+        let is_free = self.parts_apart.as_ref().is_some_and(|parts| !parts.are_resisted());
+        let reason = || "nothing resists a motion of a rigid part".to_owned();
+        Ok(is_free.then(|| Failure { body: None, reason: reason() }))
     }
 
     /// Return the range of each body in a vector of all bodies.
@@ -218,7 +182,7 @@ impl LinearStep for JointStep {
         if !self.has_stiffness {
             return self.rigid == rigid_traces(model);
         }
-        (self.motions, self.border) = (border::motions(model), None);
+        self.parts_apart = None;
         true
     }
 
@@ -248,15 +212,15 @@ impl LinearStep for JointStep {
             model.exchange.sum(&mut r);
         }
         self.matrix.update(&self.rows, springs)?;
-        if let Some(reason) = self.make_border(model, springs)? {
-            return Ok(Err(Failure { body: None, reason }));
+        if let Some(failure) = self.update_parts(model, springs)? {
+            return Ok(Err(failure));
         }
-        let (border, works) = (self.border.take(), border::works(model, &self.motions, residual));
+        let parts = self.parts_apart.take();
+        let works = parts.as_ref().map_or(Vec::new(), |parts| parts.works(model, residual));
         let mut test = |model: &Model, trial: &Trial| {
-            let Some(moved) = border.as_ref().map(|border| border.moved(&works, trial.closing)) else {
-                return enough(model, trial);
-            };
-            let closing: Vec<f64> = trial.closing.iter().zip(&moved.closing).map(|(b, n)| b + n).collect();
+            let Some(parts) = &parts else { return enough(model, trial) };
+            let (moved, mut closing) = (parts.moved(&works, trial.closing), trial.closing.to_vec());
+            parts.close(&moved.amounts, &mut closing);
             let (energy, error) = (trial.energy + moved.energy, trial.error + moved.error);
             enough(model, &Trial { closing: &closing, energy, error })
         };
@@ -268,30 +232,23 @@ impl LinearStep for JointStep {
         if let (false, Some(reason)) = (self.is_redundant, &failure) {
             return Ok(Err(Failure { body: None, reason: reason.clone() }));
         }
-        let mut energy = 0.0;
-        let mut amounts = Vec::new();
-        if let Some(border) = &border {
-            let (closing, _) = closing_and_energy(model, &self.rows, self.first, &x, &r);
-            let moved = border.moved(&works, &closing);
-            border.columns.iter().zip(&moved.amounts).for_each(|(column, &a)| axpy(-a, column, &mut x));
-            energy = if model.exchange.rank() == 0 { dot(&moved.amounts, &works) } else { 0.0 };
-            last_error = last_error.map(|error| error + moved.error);
-            amounts = moved.amounts;
-        }
-        self.border = border;
         let local = self.parts().zip(residual).filter(|(_, r)| !r.is_empty());
-        energy += local.map(|(part, _)| dot(&x[part.clone()], &r[part])).sum::<f64>();
-        let [displacements, mut apart] = self.displacements(&x, residual);
-        for (motion, a) in self.motions.iter().zip(amounts).filter(|(motion, _)| !residual[motion.body].is_empty()) {
-            apart[motion.body].push(a);
-        }
-        let (field, sums) =
+        let energy = local.map(|(part, _)| dot(&x[part.clone()], &r[part])).sum::<f64>();
+        let [displacements, apart] = self.displacements(&x, residual);
+        let (mut field, sums) =
             Field::of_step(model, displacements, &apart, &[energy, f64::from(u8::from(failure.is_some()))]);
-        let (energy, failures) = (sums[0], sums[1]);
+        let (mut energy, failures) = (sums[0], sums[1]);
         if failures > 0.0 {
             let elsewhere = || "the matrix of all bodies cannot be factored on another rank".to_owned();
             return Ok(Err(Failure { body: None, reason: failure.unwrap_or_else(elsewhere) }));
         }
+        if let Some(parts) = &parts {
+            let moved = parts.moved(&works, &field.closing());
+            parts.add_to(&moved.amounts, &mut field);
+            energy += moved.energy;
+            last_error = last_error.map(|error| error + moved.error);
+        }
+        self.parts_apart = parts;
         let accuracy = self.matrix.solver().accuracy();
         let error = last_error.unwrap_or(accuracy * energy.max(0.0).sqrt());
         Ok(Ok(LinearSolution { field, energy, error, is_exact: accuracy == 0.0 }))
@@ -305,6 +262,45 @@ impl LinearStep for JointStep {
 
     fn describe(&self) -> String {
         self.matrix.solver().describe()
+    }
+}
+
+impl WithoutRigidParts for JointStep {
+    fn is_apart(&self, _model: &Model, _body: usize) -> bool {
+        self.has_stiffness
+    }
+
+    fn closings(&self, _model: &Model, trace: &[f64]) -> Vec<f64> {
+        closing(trace).collect()
+    }
+
+    fn solve_bodies(
+        &mut self,
+        model: &mut Model,
+        force: &[f64],
+        near: Option<Field>,
+    ) -> Result<std::result::Result<(Field, f64), Failure>> {
+        let mut x = near.unwrap_or_else(|| Field::zero(model));
+        let mut rest = self.multiply(model, &x.displacements);
+        rest.iter_mut().flatten().for_each(|r| *r = -*r);
+        let held = x.closing().into_iter().zip(self.matrix.springs()).map(|(closing, spring)| closing * spring);
+        let left: Vec<f64> = force.iter().zip(held).map(|(force, held)| force - held).collect();
+        add_forces(model, &left, &mut rest);
+        let (known, load) = (dot(force, &x.closing()), self.load(model, &rest));
+        let mut change = vec![0.0; load.len()];
+        let mut enough = |_: &Model, trial: &Trial| trial.error <= ACCURACY * (known + trial.energy).sqrt();
+        let last_error = match self.solve_matrix(model, &load, &mut change, &mut enough)? {
+            Ok(last_error) => last_error,
+            Err(reason) => return Ok(Err(Failure { body: None, reason })),
+        };
+        let [displacements, apart] = self.displacements(&change, &rest);
+        x.add(1.0, &Field::of_step(model, displacements, &apart, &[]).0);
+        let energy = dot(force, &x.closing());
+        Ok(Ok((x, last_error.unwrap_or(self.matrix.solver().accuracy() * energy.max(0.0).sqrt()))))
+    }
+
+    fn multiply_bodies(&mut self, model: &mut Model, v: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        self.multiply(model, v)
     }
 }
 

@@ -6,7 +6,6 @@
 //! part.
 
 pub mod body;
-mod border;
 mod coarse;
 pub mod dofs;
 pub mod field;
@@ -14,6 +13,7 @@ pub mod joint;
 pub mod layer;
 pub mod linear;
 pub mod rigid;
+pub mod rigid_parts;
 
 pub use crate::solver::cost::{BodyFacts, compactness};
 pub use crate::solver::preset::INNER_TOLERANCE;

@@ -3,7 +3,6 @@
 //! of sweeps alone. Where a function says nothing else, its errors are failures of the solver library.
 
 mod cg;
-mod obstacle;
 pub mod spectrum;
 pub mod sweep;
 

@@ -1,15 +1,15 @@
 //! One sweep (41): every body solves its own linear problem, independently of the others. A sweep needs the Robin
 //! coefficient, and a start, which is a trace extended into every body.
 
-use super::obstacle::{self, Obstacles, is_obstacle};
 use crate::error::{Error, Result};
 use crate::exchange::{self, ASKS, asks};
 use crate::linalg::{Blocks, axpy, dot};
 use crate::model::body::Energy;
-use crate::model::field::{Field, residual};
+use crate::model::field::{Field, add_forces, residual};
 use crate::model::layer::Layer;
 use crate::model::linear::Failure;
 use crate::model::rigid::{self, NamedMotion, TOLERANCE, combined};
+use crate::model::rigid_parts::{RigidParts, WithoutRigidParts};
 use crate::model::{Model, closing};
 use crate::problem::method::{RobinRule, Zone};
 use nalgebra::DMatrix;
@@ -44,8 +44,8 @@ pub struct Sweep {
 pub struct Sweeper {
     /// Sweeps made.
     pub sweeps: usize,
-    /// The motions of obstacles.
-    obstacles: Option<Obstacles>,
+    /// The motions of obstacles, with the bodies that follow them, for the last Robin term.
+    obstacles: Option<RigidParts>,
 }
 
 impl Sweeper {
@@ -66,22 +66,25 @@ impl Sweeper {
     }
 
     /// Add the part of a correction by which obstacles move, and bodies follow them.
+    ///
+    /// By itself, an obstacle would follow the body only as far as the layer gives way: where the body has the
+    /// stiffness k and the layer kappa, an error falls by the factor 1 - gamma k/(2 kappa) in a sweep.
     fn with_obstacles(&mut self, model: &mut Model, mut sweep: Sweep, other: Option<&[Vec<f64>]>) -> Result<Sweep> {
-        let known = self.obstacles.take();
-        let mut solve = |model: &mut Model, residual: Vec<Vec<f64>>| {
-            let sweep = self.solve(model, residual, Energy::default(), None, 0)?;
-            Ok(sweep.failed.map_or(Ok(sweep.correction), Err))
-        };
-        match Obstacles::update(known, &mut solve, model)? {
+        let (known, weight) = (self.obstacles.take(), model.robin.clone());
+        match RigidParts::update(known, self, model, &weight)? {
             Ok(obstacles) => self.obstacles = obstacles,
             Err(failure) => sweep.failed = Some(sweep.failed.unwrap_or(failure)),
         }
-        let Some(obstacles) = &self.obstacles else { return Ok(sweep) };
-        let works = obstacles.works(model, &sweep.residual);
-        let amounts = obstacles.amounts(&works);
-        sweep.decrement += works.dot(&amounts);
-        sweep.product += other.map_or(0.0, |other| obstacles.works(model, other).dot(&amounts));
-        obstacles.add_to(&amounts, &mut sweep.correction);
+        let Some(mut obstacles) = self.obstacles.take() else { return Ok(sweep) };
+        if !obstacles.are_resisted() {
+            // an obstacle and the body before it are free together: each by itself is held by the other
+            obstacles.part_from_bodies(self, model);
+        }
+        let moved = obstacles.step(obstacles.joint_works(model, &sweep.residual));
+        sweep.decrement += moved.energy;
+        sweep.product += other.map_or(0.0, |other| obstacles.joint_works(model, other).dot(&moved.amounts));
+        obstacles.add_to(&moved.amounts, &mut sweep.correction);
+        self.obstacles = Some(obstacles);
         Ok(sweep)
     }
 
@@ -139,6 +142,57 @@ impl Sweeper {
     }
 }
 
+impl WithoutRigidParts for Sweeper {
+    fn is_apart(&self, model: &Model, body: usize) -> bool {
+        is_obstacle(model, body)
+    }
+
+    /// Return the closings of the contact rows (2n) as the bodies before obstacles have them: with those of the
+    /// obstacles.
+    fn closings(&self, model: &Model, trace: &[f64]) -> Vec<f64> {
+        let (points, mut rows) = (model.points(), trace.to_vec());
+        for q in before_obstacles(model) {
+            rows[q] += std::mem::take(&mut rows[points + q]);
+        }
+        rows
+    }
+
+    fn solve_bodies(
+        &mut self,
+        model: &mut Model,
+        force: &[f64],
+        _near: Option<Field>,
+    ) -> Result<std::result::Result<(Field, f64), Failure>> {
+        let mut residual = Field::zero(model).displacements;
+        add_forces(model, force, &mut residual);
+        let sweep = self.solve(model, residual, Energy::default(), None, 0)?;
+        Ok(sweep.failed.map_or(Ok((sweep.correction, 0.0)), Err))
+    }
+
+    fn multiply_bodies(&mut self, model: &mut Model, v: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        model.multiply(v)
+    }
+}
+
+/// Return whether a rigid part is an obstacle, the only partner of the body before it.
+fn is_obstacle(model: &Model, body: usize) -> bool {
+    let slot = &model.bodies[body];
+    slot.is_rigid && slot.segments.iter().any(|segment| model.pairs[segment.pair].bodies[1] == body)
+}
+
+/// Return the points of all pairs with an obstacle.
+fn before_obstacles(model: &Model) -> impl Iterator<Item = usize> + '_ {
+    (0..model.pairs.len()).filter(|&pair| is_obstacle(model, model.pairs[pair].bodies[1])).flat_map(|i| model.range(i))
+}
+
+/// Give both sides of a pair with an obstacle the larger of their weights (2n): they have one system.
+fn join_obstacles(model: &Model, weight: &mut [f64]) {
+    for q in before_obstacles(model) {
+        let larger = weight[q].max(weight[model.points() + q]);
+        (weight[q], weight[model.points() + q]) = (larger, larger);
+    }
+}
+
 /// The zone and the rule of the Robin term, with the weights that a frozen rule keeps.
 ///
 /// Any symmetric positive definite G leads to the same solution; G decides how fast. There is one weight for each
@@ -176,7 +230,7 @@ impl Coefficient {
             }
             RobinRule::Frozen | RobinRule::Auto => constrained(model, tangent),
         };
-        obstacle::join(model, &mut weight);
+        join_obstacles(model, &mut weight);
         if self.rule == RobinRule::Frozen {
             self.frozen = Some(weight.clone());
         }

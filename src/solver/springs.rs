@@ -77,6 +77,11 @@ impl SpringMatrix {
         Ok(())
     }
 
+    /// Return the spring stiffnesses d of G, one a row of B.
+    pub fn springs(&self) -> &[f64] {
+        &self.springs
+    }
+
     /// Count the seconds of a factorisation or set-up.
     fn count_seconds(&mut self, seconds: f64) {
         self.counts.factor_seconds += seconds;
