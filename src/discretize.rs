@@ -65,7 +65,7 @@ pub struct Discrete {
     /// Motions that nothing resists.
     pub mechanisms: Vec<Mechanism>,
     /// The meshes, kept only if an estimate of the error was requested.
-    pub meshes: Option<Rc<dyn Meshes>>,
+    pub meshes: Option<Meshes>,
     /// Whether all bodies have the matrices and solvers of the problem before.
     pub is_renewed: bool,
     /// Number of stiffness matrices that this rank has assembled in the run.
@@ -150,7 +150,7 @@ where
     }
     let Assembler { assemblies, shapes, .. } = assembler;
     let pairings = pairings + if rank == 0 { searched } else { 0 };
-    let meshes = keep.then(|| Rc::new(KeptMeshes { shapes, fine }) as Rc<dyn Meshes>);
+    let meshes = keep.map(|keep| keep(Rc::new(KeptMeshes { shapes, fine })));
     let of_rank = |slot: BodySlot| {
         if rank == 0 && !slot.motions.is_empty() {
             BodySlot { local: Some(Body::rigid(&slot.motions)), ..slot }

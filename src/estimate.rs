@@ -12,7 +12,7 @@ mod pressure;
 pub mod sizes;
 
 use crate::ddm::respond;
-use crate::discretize::meshes::{Meshes, RecoveredFields};
+use crate::discretize::meshes::{KeptMeshes, Meshes, RecoveredBody, in_dimension};
 use crate::error::{Error, Kind, Result};
 use crate::fem::Errors;
 use crate::linalg::axpy;
@@ -95,7 +95,17 @@ const TOLERANCE: f64 = 0.01;
 /// # Errors
 /// Failures of the solver library.
 pub fn estimate(
-    meshes: &dyn Meshes,
+    meshes: &Meshes,
+    model: &mut Model,
+    step: &mut dyn LinearStep,
+    iterate: &Field,
+    layer: &Layer,
+) -> Result<Estimate> {
+    in_dimension!(meshes, kept => estimate_in(kept, model, step, iterate, layer))
+}
+
+fn estimate_in<const D: usize>(
+    meshes: &KeptMeshes<D>,
     model: &mut Model,
     step: &mut dyn LinearStep,
     iterate: &Field,
@@ -153,7 +163,11 @@ pub fn estimate(
 }
 
 /// Return the displacements of all nodes of each body, on the rank that owns it. Collective.
-fn displacements(meshes: &dyn Meshes, model: &Model, iterate: &Field) -> Result<Vec<Option<Vec<f64>>>> {
+fn displacements<const D: usize>(
+    meshes: &KeptMeshes<D>,
+    model: &Model,
+    iterate: &Field,
+) -> Result<Vec<Option<Vec<f64>>>> {
     let mut all = Vec::new();
     for (index, (state, rigid)) in iterate.displacements.iter().zip(&iterate.rigid).enumerate() {
         let slot = &model.bodies[index];
@@ -219,7 +233,7 @@ fn relative_norm(squared: f64, reference: f64, held: f64) -> f64 {
 }
 
 /// The recovered displacement of each body, on the rank that owns it.
-type RecoveredBodies<'a> = [Option<Box<dyn RecoveredFields + 'a>>];
+type RecoveredBodies<'a, const D: usize> = [Option<RecoveredBody<'a, D>>];
 
 /// The errors that recovered displacements show without a solve.
 struct LocalErrors {
@@ -240,7 +254,7 @@ struct LocalErrors {
 
 impl LocalErrors {
     /// Return the errors of the bodies, without those of the layers. `work_on_missed` has an entry for each body.
-    fn of_bodies(recovered: &RecoveredBodies, work_on_missed: &[f64]) -> Self {
+    fn of_bodies<const D: usize>(recovered: &RecoveredBodies<D>, work_on_missed: &[f64]) -> Self {
         let count = recovered.len();
         let none = || vec![Vec::new(); count];
         let (cells, rates, strips, loads) = (none(), none(), none(), none());
@@ -257,12 +271,12 @@ impl LocalErrors {
 
     /// Add the error of the layer of a pair, and the error of its forces on both bodies. To be called for the pairs in
     /// their order. Collective.
-    fn add_pair(
+    fn add_pair<const D: usize>(
         &mut self,
-        meshes: &dyn Meshes,
+        meshes: &KeptMeshes<D>,
         model: &Model,
         layer: &Layer,
-        recovered: &RecoveredBodies,
+        recovered: &RecoveredBodies<D>,
         (index, rigid): (usize, &[f64]),
     ) {
         let (pair, points, range) = (&model.pairs[index], meshes.points(index), model.range(index));
@@ -301,7 +315,12 @@ impl LocalErrors {
 }
 
 /// Return the work of the pressures of all contacts on the interpolation error of each body that this rank owns.
-fn work_on_missed(meshes: &dyn Meshes, model: &Model, layer: &Layer, recovered: &RecoveredBodies) -> Vec<f64> {
+fn work_on_missed<const D: usize>(
+    meshes: &KeptMeshes<D>,
+    model: &Model,
+    layer: &Layer,
+    recovered: &RecoveredBodies<D>,
+) -> Vec<f64> {
     let mut work = vec![0.0; recovered.len()];
     for (index, pair) in model.pairs.iter().enumerate() {
         let (points, pressure) = (meshes.points(index), &layer.pressure[model.range(index)]);
@@ -318,7 +337,7 @@ fn work_on_missed(meshes: &dyn Meshes, model: &Model, layer: &Layer, recovered: 
 }
 
 /// Turn loads at the nodes of each body into those at its dofs, on all ranks that have a part of the body. Collective.
-fn to_dofs(meshes: &dyn Meshes, model: &Model, loads: &mut [Vec<f64>]) {
+fn to_dofs<const D: usize>(meshes: &KeptMeshes<D>, model: &Model, loads: &mut [Vec<f64>]) {
     for (body, load) in loads.iter_mut().enumerate().filter(|(_, load)| !load.is_empty()) {
         meshes.forces(body, load);
     }
@@ -333,7 +352,7 @@ fn to_dofs(meshes: &dyn Meshes, model: &Model, loads: &mut [Vec<f64>]) {
 /// Return the body with the largest error, and the centre of its worst cell in the scene, if the estimated energy error
 /// is as large as the solution. The mesh is then too coarse, or its cells are too flat, for the estimate to mean
 /// anything. Collective.
-pub fn lost_at(meshes: &dyn Meshes, model: &Model, estimate: &Estimate) -> Option<(usize, [f64; 3])> {
+pub fn lost_at(meshes: &Meshes, model: &Model, estimate: &Estimate) -> Option<(usize, [f64; 3])> {
     if estimate.energy < 1.0 {
         return None;
     }

@@ -156,7 +156,7 @@ impl AdaptiveRun {
             if head.is_none() {
                 let bodies = own.discrete.bodies.len();
                 let cells = bodies * pace.first_cells;
-                let coarse = |meshes: &Rc<dyn Meshes>| mesh_of(&sizes::coarse(&**meshes, bodies, cells));
+                let coarse = |meshes: &Meshes| mesh_of(&sizes::coarse(meshes, bodies, cells));
                 follow(scene, own.discrete.meshes.as_ref().map(coarse).map(Into::into));
                 plan.defer_steps();
             }
@@ -340,7 +340,7 @@ impl AdaptiveRun {
         let excess = self.predicted_cells.map_or(1.0, |predicted| predicted / cells);
         let most = goal.cells as f64 * excess;
         let aim = Aim { share, more: pace.growth, most };
-        let mut next = sizes::wanted(&**meshes, model, &done.outcome.layer, estimate, aim);
+        let mut next = sizes::wanted(meshes, model, &done.outcome.layer, estimate, aim);
         // where the script bounds the sizes, no smaller ones give the missing cells: GROWTH bounds what is tried
         next.refine(excess.clamp(1.0, pace.growth.max(1.0)).min(most / next.cells));
         let is_full = next.cells >= 0.9 * most && cells >= 0.7 * goal.cells as f64;

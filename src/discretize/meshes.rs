@@ -8,39 +8,46 @@ use crate::linalg::{Csr, axpy, dot};
 use std::rc::Rc;
 
 /// The meshes of all bodies and pairs, kept for an estimate of the error.
-pub trait Meshes {
-    /// Return the displacements of all nodes of a body for a state of all its dofs.
-    fn displacements(&self, body: usize, state: &[f64]) -> Vec<f64>;
+#[derive(Clone)]
+pub enum Meshes {
+    /// A scene in the plane, or of bodies of revolution.
+    Plane(Rc<KeptMeshes<2>>),
+    /// A scene in space.
+    Space(Rc<KeptMeshes<3>>),
+}
 
-    /// Turn forces at the nodes of a body into forces at its dofs.
-    fn forces(&self, body: usize, load: &mut [f64]);
+/// Evaluate an expression with the meshes in their dimension.
+macro_rules! in_dimension {
+    ($meshes:expr, $kept:ident => $value:expr) => {
+        match $meshes {
+            Meshes::Plane($kept) => $value,
+            Meshes::Space($kept) => $value,
+        }
+    };
+}
+pub(crate) use in_dimension;
 
-    /// Recover smoother fields from the displacements `u` of all nodes of a body.
-    fn recover<'a>(&'a self, body: usize, u: &'a [f64]) -> Box<dyn RecoveredFields + 'a>;
-
-    /// Return the displacements of all nodes of a body in the rigid motions that its supports leave, with these
-    /// amounts.
-    fn moved(&self, body: usize, amounts: &[f64]) -> Vec<f64>;
-
-    /// Return the magnitude of the nodal force at each entry of `load`, which holds forces at all nodes of a body.
-    fn sizes(&self, body: usize, load: &[f64]) -> Vec<f64>;
-
-    /// Return the outer normal displacement at the integration points of a side of a pair, for displacements `u` of all
-    /// nodes of its body.
-    fn normal_displacement(&self, pair: usize, side: usize, u: &[f64]) -> Vec<f64>;
-
+impl Meshes {
     /// Return the integration points of a pair.
-    fn points(&self, pair: usize) -> &FinePoints;
+    pub fn points(&self, pair: usize) -> &FinePoints {
+        in_dimension!(self, kept => kept.points(pair))
+    }
 
     /// Return the vertices of the facet at an integration point of a side of a pair, with the barycentric coordinates
     /// of the point.
-    fn vertices(&self, pair: usize, side: usize, point: usize) -> Vec<(u32, f64)>;
+    pub fn vertices(&self, pair: usize, side: usize, point: usize) -> Vec<(u32, f64)> {
+        in_dimension!(self, kept => kept.vertices(pair, side, point))
+    }
 
     /// Return the cells of a body.
-    fn cells(&self, body: usize) -> BodyCells;
+    pub fn cells(&self, body: usize) -> BodyCells {
+        in_dimension!(self, kept => kept.cells(body))
+    }
 
     /// Return the order of convergence of the energy error of a body, which is the degree of its elements.
-    fn degree(&self, body: usize) -> usize;
+    pub fn degree(&self, body: usize) -> usize {
+        in_dimension!(self, kept => kept.degree(body))
+    }
 }
 
 /// The cells of a body by their corners.
@@ -58,33 +65,7 @@ pub struct BodyCells {
     pub sizes: Vec<f64>,
 }
 
-/// A displacement of a body with the fields recovered from it.
-pub trait RecoveredFields {
-    /// Return the errors of the body, see [`Recovery::errors`].
-    fn errors(&self, work_on_missed: f64) -> Errors;
-
-    /// Return the products of the errors of this displacement and of the displacements `other` of all nodes in each
-    /// cell, see [`Recovery::products`].
-    fn products(&self, other: &[f64]) -> Vec<f64>;
-
-    /// Return the work `sum force_g n.b` of forces at the integration points of a side of a pair on the interpolation
-    /// error b.
-    fn work_on_missed(&self, pair: usize, side: usize, force: &[f64]) -> f64;
-
-    /// Return the outer normal displacement at the integration points of a side of a pair, including the interpolation
-    /// error.
-    fn recovered_displacement(&self, pair: usize, side: usize) -> Vec<f64>;
-
-    /// Return, at each contact point of a pair, how much the compression changes if the mean around the point is
-    /// replaced by the value at the point itself. The body is side b of the pair, and `rows` are the rows B_b of its
-    /// nodal displacements.
-    fn beyond_means(&self, pair: usize, rows: &Csr) -> Vec<f64>;
-
-    /// Add `sum force_g n.v` over the integration points of a side of a pair to `r`, for every shape function v.
-    fn add_forces(&self, pair: usize, side: usize, force: &[f64], r: &mut [f64]);
-}
-
-/// The implementation of [`Meshes`] in `D` dimensions.
+/// The meshes in `D` dimensions.
 pub struct KeptMeshes<const D: usize> {
     /// Bodies in the order of the scene.
     pub shapes: Vec<Rc<FemBody<D>>>,
@@ -92,23 +73,28 @@ pub struct KeptMeshes<const D: usize> {
     pub fine: Vec<Rc<Fine<D>>>,
 }
 
-impl<const D: usize> Meshes for KeptMeshes<D> {
-    fn displacements(&self, body: usize, state: &[f64]) -> Vec<f64> {
+impl<const D: usize> KeptMeshes<D> {
+    /// Return the displacements of all nodes of a body for a state of all its dofs.
+    pub fn displacements(&self, body: usize, state: &[f64]) -> Vec<f64> {
         self.shapes[body].mesh.held.frame.displacements(state)
     }
 
-    fn forces(&self, body: usize, load: &mut [f64]) {
+    /// Turn forces at the nodes of a body into forces at its dofs.
+    pub fn forces(&self, body: usize, load: &mut [f64]) {
         self.shapes[body].mesh.held.frame.forces(load);
     }
 
-    fn recover<'a>(&'a self, body: usize, u: &'a [f64]) -> Box<dyn RecoveredFields + 'a> {
+    /// Recover smoother fields from the displacements `u` of all nodes of a body.
+    pub fn recover<'a>(&'a self, body: usize, u: &'a [f64]) -> RecoveredBody<'a, D> {
         let shape = &self.shapes[body];
         let split = shape.split();
         let recovery = Recovery::new(&split.space, &shape.elasticity, split.values(u));
-        Box::new(OnBody { kept: self, shape, split, u, recovery })
+        RecoveredBody { kept: self, shape, split, u, recovery }
     }
 
-    fn moved(&self, body: usize, amounts: &[f64]) -> Vec<f64> {
+    /// Return the displacements of all nodes of a body in the rigid motions that its supports leave, with these
+    /// amounts.
+    pub fn moved(&self, body: usize, amounts: &[f64]) -> Vec<f64> {
         let BodyMesh { space, unsupported_modes, .. } = &self.shapes[body].mesh;
         let mut moved = vec![0.0; space.dofs()];
         for (motion, amount) in unsupported_modes.iter().zip(amounts) {
@@ -117,11 +103,14 @@ impl<const D: usize> Meshes for KeptMeshes<D> {
         moved
     }
 
-    fn sizes(&self, _body: usize, load: &[f64]) -> Vec<f64> {
+    /// Return the magnitude of the nodal force at each entry of `load`, which holds forces at nodes.
+    pub fn sizes(&self, load: &[f64]) -> Vec<f64> {
         load.chunks_exact(D).flat_map(|force| [dot(force, force).sqrt(); D]).collect()
     }
 
-    fn normal_displacement(&self, pair: usize, side: usize, u: &[f64]) -> Vec<f64> {
+    /// Return the outer normal displacement at the integration points of a side of a pair, for displacements `u` of all
+    /// nodes of its body.
+    pub fn normal_displacement(&self, pair: usize, side: usize, u: &[f64]) -> Vec<f64> {
         let fine = &self.fine[pair];
         let on = &fine.sides[side];
         let sign = if side == 0 { 1.0 } else { -1.0 };
@@ -132,16 +121,19 @@ impl<const D: usize> Meshes for KeptMeshes<D> {
         on.facet.iter().zip(&on.at).zip(&fine.normal).map(at_point).collect()
     }
 
-    fn points(&self, pair: usize) -> &FinePoints {
+    /// See [`Meshes::points`].
+    pub fn points(&self, pair: usize) -> &FinePoints {
         &self.fine[pair].points
     }
 
-    fn vertices(&self, pair: usize, side: usize, point: usize) -> Vec<(u32, f64)> {
+    /// See [`Meshes::vertices`].
+    pub fn vertices(&self, pair: usize, side: usize, point: usize) -> Vec<(u32, f64)> {
         let on = &self.fine[pair].sides[side];
         on.facets.facet(on.facet[point]).iter().copied().zip(on.at[point]).collect()
     }
 
-    fn cells(&self, body: usize) -> BodyCells {
+    /// See [`Meshes::cells`].
+    pub fn cells(&self, body: usize) -> BodyCells {
         let space = &self.shapes[body].mesh.space;
         // This is the measure of the regular simplex with edges of length one.
         let regular = if D == 2 { 3f64.sqrt() / 4.0 } else { 2f64.sqrt() / 12.0 };
@@ -158,12 +150,14 @@ impl<const D: usize> Meshes for KeptMeshes<D> {
         }
     }
 
-    fn degree(&self, body: usize) -> usize {
+    /// See [`Meshes::degree`].
+    pub fn degree(&self, body: usize) -> usize {
         self.shapes[body].mesh.space.order.degree()
     }
 }
 
-struct OnBody<'a, const D: usize> {
+/// A displacement of a body with the fields recovered from it.
+pub struct RecoveredBody<'a, const D: usize> {
     kept: &'a KeptMeshes<D>,
     shape: &'a FemBody<D>,
     split: &'a Split<D>,
@@ -171,7 +165,7 @@ struct OnBody<'a, const D: usize> {
     recovery: Recovery<'a, D>,
 }
 
-impl<const D: usize> OnBody<'_, D> {
+impl<const D: usize> RecoveredBody<'_, D> {
     /// Return the displacement at a point of a facet, including the interpolation error.
     fn displacement(&self, at: &FacetPoint<D>) -> [f64; D] {
         let mut u = self.missed(at);
@@ -210,30 +204,40 @@ struct FacetPoint<'a, const D: usize> {
     l: &'a [f64; D],
 }
 
-impl<const D: usize> RecoveredFields for OnBody<'_, D> {
-    fn errors(&self, work_on_missed: f64) -> Errors {
+impl<const D: usize> RecoveredBody<'_, D> {
+    /// Return the errors of the body, see [`Recovery::errors`].
+    pub fn errors(&self, work_on_missed: f64) -> Errors {
         let errors = self.recovery.errors(work_on_missed);
         Errors { load: self.split.sums(errors.load), ..errors }
     }
 
-    fn products(&self, other: &[f64]) -> Vec<f64> {
+    /// Return the products of the errors of this displacement and of the displacements `other` of all nodes in each
+    /// cell, see [`Recovery::products`].
+    pub fn products(&self, other: &[f64]) -> Vec<f64> {
         let split = self.split;
         self.recovery.products(&Recovery::new(&split.space, &self.shape.elasticity, split.values(other)))
     }
 
-    fn work_on_missed(&self, pair: usize, side: usize, force: &[f64]) -> f64 {
+    /// Return the work `sum force_g n.b` of forces at the integration points of a side of a pair on the interpolation
+    /// error b.
+    pub fn work_on_missed(&self, pair: usize, side: usize, force: &[f64]) -> f64 {
         let mut work = 0.0;
         self.visit(pair, side, |g, normal, at| work += force[g] * dot(&normal, &self.missed(&at)));
         work
     }
 
-    fn recovered_displacement(&self, pair: usize, side: usize) -> Vec<f64> {
+    /// Return the outer normal displacement at the integration points of a side of a pair, including the interpolation
+    /// error.
+    pub fn recovered_displacement(&self, pair: usize, side: usize) -> Vec<f64> {
         let mut values = vec![0.0; self.kept.fine[pair].points.each.len()];
         self.visit(pair, side, |g, normal, at| values[g] = dot(&normal, &self.displacement(&at)));
         values
     }
 
-    fn beyond_means(&self, pair: usize, rows: &Csr) -> Vec<f64> {
+    /// Return, at each contact point of a pair, how much the compression changes if the mean around the point is
+    /// replaced by the value at the point itself. The body is side b of the pair, and `rows` are the rows B_b of its
+    /// nodal displacements.
+    pub fn beyond_means(&self, pair: usize, rows: &Csr) -> Vec<f64> {
         let Fine { near, sides, .. } = &*self.kept.fine[pair];
         let (mut mean, split) = (vec![0.0; near.at.len()], self.split.facets(&sides[1].facets));
         rows.multiply(self.u, &mut mean);
@@ -246,7 +250,8 @@ impl<const D: usize> RecoveredFields for OnBody<'_, D> {
         mean.into_iter().enumerate().map(lacks).collect()
     }
 
-    fn add_forces(&self, pair: usize, side: usize, force: &[f64], r: &mut [f64]) {
+    /// Add `sum force_g n.v` over the integration points of a side of a pair to `r`, for every shape function v.
+    pub fn add_forces(&self, pair: usize, side: usize, force: &[f64], r: &mut [f64]) {
         self.visit(pair, side, |g, normal, at| {
             for (&node, phi) in at.nodes.iter().zip(element::values(self.shape.mesh.space.order, at.l)) {
                 (0..D).for_each(|c| r[D * node as usize + c] += force[g] * phi * normal[c]);

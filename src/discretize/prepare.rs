@@ -7,6 +7,7 @@ use super::bodies::parts;
 use super::body::BodyMesh;
 use super::facts::BodyInfo;
 use super::kept::{EarlierPair, Kept, MatrixInputs};
+use super::meshes::{KeptMeshes, Meshes};
 use super::pairs::{self, Contact, ContactFacts, Contacts};
 use super::partition::Partition;
 use super::verify::Verified;
@@ -32,8 +33,8 @@ pub struct Request<'a, const D: usize> {
     pub verified: &'a Verified<D>,
     /// Function that finds the common pieces of surfaces in this dimension.
     pub cut: Cut<D>,
-    /// Whether the meshes are kept for an estimate of the error.
-    pub keep: bool,
+    /// What wraps the meshes, if they are kept for an estimate of the error.
+    pub keep: Option<fn(Rc<KeptMeshes<D>>) -> Meshes>,
 }
 
 /// What all ranks have of a prepared problem.
@@ -107,6 +108,7 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     pairs: Vec<EarlierPair>,
 ) -> Result<(ReplicatedProblem<D, F::SolverPlan>, WholeProblem<'a, D>)> {
     let Request { scene, verified, cut, keep } = *request;
+    let keep = keep.is_some();
     let mesh = &verified.mesh;
     let mut before = std::mem::take(kept);
     let parts = parts(scene, verified, &before.spaces())?;

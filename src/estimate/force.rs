@@ -15,7 +15,7 @@
 use super::{RecoveredBodies, TOLERANCE, displacements, rigid_closing, softness, to_dofs};
 use crate::contact::FinePoint;
 use crate::ddm::respond;
-use crate::discretize::meshes::Meshes;
+use crate::discretize::meshes::KeptMeshes;
 use crate::error::{Error, Kind, Result};
 use crate::linalg::{axpy, dot};
 use crate::model::{Field, Layer, LinearStep, Model};
@@ -32,12 +32,12 @@ const UNCERTAIN: f64 = 0.4;
 const MOST: usize = 32;
 
 /// The discrete solution with what is recovered from it.
-pub(super) struct Solution<'a> {
+pub(super) struct Solution<'a, const D: usize> {
     pub iterate: &'a Field,
     pub layer: &'a Layer,
     /// Displacements of all nodes of each body, on the rank that owns it.
     pub displacements: &'a [Option<Vec<f64>>],
-    pub recovered: &'a RecoveredBodies<'a>,
+    pub recovered: &'a RecoveredBodies<'a, D>,
 }
 
 /// Return the relative errors of the forces of all pairs. `pressure_error` is the error of the pressures, n.
@@ -45,11 +45,11 @@ pub(super) struct Solution<'a> {
 ///
 /// # Errors
 /// Failures of the solver library.
-pub(super) fn errors(
-    meshes: &dyn Meshes,
+pub(super) fn errors<const D: usize>(
+    meshes: &KeptMeshes<D>,
     model: &mut Model,
     step: &mut dyn LinearStep,
-    solution: &Solution,
+    solution: &Solution<D>,
     pressure_error: &[f64],
 ) -> Result<Vec<f64>> {
     let mut errors = Vec::new();
@@ -108,8 +108,8 @@ impl Influence {
     /// A rigid part under a given force has no stiffness, and its motions N are not in K. With the amounts a that leave
     /// the least of 1 - N a, measured by omega kappa, the loads B' omega kappa (1 - N a) do no work on them, and the
     /// response with the motion a is z.
-    fn of(
-        meshes: &dyn Meshes,
+    fn of<const D: usize>(
+        meshes: &KeptMeshes<D>,
         model: &mut Model,
         step: &mut dyn LinearStep,
         layer: &Layer,
@@ -138,7 +138,7 @@ impl Influence {
     }
 
     /// Return the sum over cells. Collective.
-    fn of_cells(&self, model: &Model, recovered: &RecoveredBodies) -> Parts {
+    fn of_cells<const D: usize>(&self, model: &Model, recovered: &RecoveredBodies<D>) -> Parts {
         let bodies = recovered.iter().zip(&self.displacements);
         let products = bodies.filter_map(|(recovered, z)| Some(recovered.as_ref()?.products(z.as_ref()?)));
         let Parts { signed, sizes } = Parts::of(products.flatten());
@@ -153,7 +153,7 @@ impl Influence {
     /// the displacements with any pressure. The bodies give way to a pressure that varies within a facet: with their
     /// compliance s the pressure is where the law meets the line c_h - s (p - p_i) through the interpolated pressure
     /// p_i.
-    fn of_facets(&self, meshes: &dyn Meshes, model: &Model, solution: &Solution) -> Parts {
+    fn of_facets<const D: usize>(&self, meshes: &KeptMeshes<D>, model: &Model, solution: &Solution<D>) -> Parts {
         let (pair, points) = (&model.pairs[self.pair], meshes.points(self.pair));
         let (pressure, soft) = (&solution.layer.pressure[model.range(self.pair)], softness(model, self.pair));
         let rigid = rigid_closing(model, solution.iterate, self.pair);

@@ -5,7 +5,7 @@
 //! force F moves the bodies by F/k and stores the energy F^2/k. Both grow without bound as k decreases, and so do their
 //! errors. They do not concern deformations and pressures, so neither the error nor the solution includes them.
 
-use crate::discretize::meshes::Meshes;
+use crate::discretize::meshes::KeptMeshes;
 use crate::linalg::dot;
 use crate::model::rigid::Motions;
 use crate::model::{Layer, Model};
@@ -65,7 +65,7 @@ impl HoldingSprings {
     /// nodal force changes in proportion to its magnitude. Collective.
     ///
     /// The forces that the springs would carry then act on the bodies themselves, as in a solution without springs.
-    pub fn balance(&self, meshes: &dyn Meshes, model: &Model, loads: &mut [Vec<f64>]) {
+    pub fn balance<const D: usize>(&self, meshes: &KeptMeshes<D>, model: &Model, loads: &mut [Vec<f64>]) {
         let count = self.motions.len();
         if count == 0 {
             return;
@@ -75,7 +75,7 @@ impl HoldingSprings {
         let mut sums = vec![0.0; count * (count + 1)];
         for (body, load) in loads.iter().enumerate().filter(|(_, load)| !load.is_empty()) {
             let moved: Vec<Vec<f64>> = (0..count).map(|k| meshes.moved(body, &amounts(k, body))).collect();
-            let sizes = meshes.sizes(body, load);
+            let sizes = meshes.sizes(load);
             for (i, u) in moved.iter().enumerate() {
                 sums[i] += dot(u, load);
                 let weighted: Vec<f64> = u.iter().zip(&sizes).map(|(u, size)| u * size).collect();
@@ -87,7 +87,7 @@ impl HoldingSprings {
         let Some(factor) = DMatrix::from_row_slice(count, count, products).cholesky() else { return };
         let shares = factor.solve(&DVector::from_column_slice(work));
         for (body, load) in loads.iter_mut().enumerate().filter(|(_, load)| !load.is_empty()) {
-            let sizes = meshes.sizes(body, load);
+            let sizes = meshes.sizes(load);
             for k in 0..count {
                 let moved = meshes.moved(body, &amounts(k, body));
                 for ((load, u), size) in load.iter_mut().zip(moved).zip(&sizes) {

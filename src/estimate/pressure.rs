@@ -1,7 +1,7 @@
 //! The errors of the pressures of pairs: between contact points, and at rims.
 
 use crate::contact::{ContactPair, FinePoints};
-use crate::discretize::meshes::Meshes;
+use crate::discretize::meshes::KeptMeshes;
 use crate::model::layer::meeting_slopes;
 use crate::model::{Layer, Model};
 use crate::problem::order::Order;
@@ -64,7 +64,7 @@ impl PressureErrors {
     /// The response that gave these is that of springs at the closed points. So a point that opens or closes takes the
     /// resolvent of its law for the state in the response, as in a step of Newton's method. This allows for the bodies,
     /// which give way to the pressure of a point however stiff its layer is.
-    pub fn new(meshes: &dyn Meshes, model: &Model, layer: &Layer, closing: &[f64]) -> Self {
+    pub fn new<const D: usize>(meshes: &KeptMeshes<D>, model: &Model, layer: &Layer, closing: &[f64]) -> Self {
         let compression: Vec<f64> = layer.compression.iter().zip(closing).map(|(c, more)| c + more).collect();
         let resolved = Layer::resolve(model, &compression, &layer.linear(&compression), &meeting_slopes(model), &[]);
         let error = resolved.pressure.iter().zip(&layer.pressure).map(|(exact, discrete)| exact - discrete).collect();

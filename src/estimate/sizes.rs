@@ -59,7 +59,7 @@ const EVEN: Grading = Grading { range: [0.25, 2.0], growth: 0.5, is_steep: false
 const STEEP: Grading = Grading { range: [0.25, 4.0], growth: 1.0, is_steep: true };
 
 /// Return the grading of a body.
-fn grading(meshes: &dyn Meshes, body: usize) -> &'static Grading {
+fn grading(meshes: &Meshes, body: usize) -> &'static Grading {
     if meshes.degree(body) > 2 { &STEEP } else { &EVEN }
 }
 
@@ -80,7 +80,7 @@ pub struct Aim {
 /// With h -> s h the squared error eta^2 of a cell becomes s^(2p) eta^2, and s^-D cells take its place. The number of
 /// cells is least where s^(2p + D) eta^2 is the same everywhere. Every cell of the new mesh then has nearly the same
 /// error.
-pub fn wanted(meshes: &dyn Meshes, model: &Model, layer: &Layer, estimate: &Estimate, aim: Aim) -> Sizes {
+pub fn wanted(meshes: &Meshes, model: &Model, layer: &Layer, estimate: &Estimate, aim: Aim) -> Sizes {
     let Aim { share, more, most } = aim;
     let bodies = model.meshed();
     let counts = counts(meshes, bodies);
@@ -125,7 +125,7 @@ pub fn wanted(meshes: &dyn Meshes, model: &Model, layer: &Layer, estimate: &Esti
 
 /// Return where contacts end and gaps have kinks on edges of order three or more, whose polynomials converge fast only
 /// beside these places.
-fn singular_places(meshes: &dyn Meshes, model: &Model, layer: &Layer) -> Vec<[f64; 3]> {
+fn singular_places(meshes: &Meshes, model: &Model, layer: &Layer) -> Vec<[f64; 3]> {
     let mut places = Vec::new();
     for (index, pair) in model.pairs.iter().enumerate() {
         let points = meshes.points(index);
@@ -171,7 +171,7 @@ fn zero_between(at: &[f64], values: &[f64]) -> Option<f64> {
 }
 
 /// Return the distance of each cell from the contact points of its body, as a multiple of its size.
-fn distances(meshes: &dyn Meshes, model: &Model) -> Vec<f64> {
+fn distances(meshes: &Meshes, model: &Model) -> Vec<f64> {
     let mut all = Vec::new();
     for body in 0..model.meshed() {
         let cells = meshes.cells(body);
@@ -235,7 +235,7 @@ impl CellError {
 
 /// Return the sizes of the meshes, but none below a smallest size. With this size everywhere the bodies together would
 /// have about this number of `cells`.
-pub fn coarse(meshes: &dyn Meshes, bodies: usize, cells: usize) -> Sizes {
+pub fn coarse(meshes: &Meshes, bodies: usize, cells: usize) -> Sizes {
     let power = meshes.cells(0).stride as f64 - 1.0;
     let volume: f64 = (0..bodies).flat_map(|body| meshes.cells(body).sizes).map(|size| size.powf(power)).sum::<f64>();
     let least = (volume / cells as f64).powf(1.0 / power);
@@ -243,7 +243,7 @@ pub fn coarse(meshes: &dyn Meshes, bodies: usize, cells: usize) -> Sizes {
 }
 
 /// Return the number of cells of each body.
-fn counts(meshes: &dyn Meshes, bodies: usize) -> Vec<usize> {
+fn counts(meshes: &Meshes, bodies: usize) -> Vec<usize> {
     (0..bodies).map(|body| meshes.cells(body).sizes.len()).collect()
 }
 
@@ -255,7 +255,7 @@ struct Touching {
 }
 
 /// Return the integration points of all pairs that are under pressure.
-fn touching(meshes: &dyn Meshes, model: &Model, layer: &Layer) -> Vec<Touching> {
+fn touching(meshes: &Meshes, model: &Model, layer: &Layer) -> Vec<Touching> {
     let mut all = Vec::new();
     let is_meshed = |pair: &ContactPair| !model.bodies[pair.bodies[1]].is_rigid;
     for (index, pair) in model.pairs.iter().enumerate().filter(|(_, pair)| is_meshed(pair)) {
@@ -313,7 +313,7 @@ impl MeanSize {
 
 /// Return the field of the sizes that `wanted` returns for each cell. Its arguments are the index of the cell, counted
 /// over all bodies, and the present size of the cell. Surfaces get one size at the points where they are `touching`.
-fn gather(meshes: &dyn Meshes, counts: &[usize], touching: &[Touching], wanted: impl Fn(usize, f64) -> f64) -> Sizes {
+fn gather(meshes: &Meshes, counts: &[usize], touching: &[Touching], wanted: impl Fn(usize, f64) -> f64) -> Sizes {
     let bodies: Vec<BodyCells> = (0..counts.len()).map(|body| meshes.cells(body)).collect();
     let (mut first, mut sizes) = (0, Vec::new());
     for (body, (of_body, &count)) in bodies.iter().zip(counts).enumerate() {

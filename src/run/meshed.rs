@@ -4,6 +4,7 @@
 use super::inner::SolverFactory;
 use crate::contact::ContactPair;
 use crate::contact::pieces::{self, Cut};
+use crate::discretize::meshes::{KeptMeshes, Meshes};
 use crate::discretize::{self, Discrete, Kept, Request, Verified};
 use crate::error::Result;
 use crate::exchange::Plain;
@@ -77,6 +78,7 @@ struct CheckedMesh<const D: usize> {
     verified: Verified<D>,
     facts: MeshFacts,
     cut: Cut<D>,
+    keep: fn(Rc<KeptMeshes<D>>) -> Meshes,
     kept: Kept<D>,
 }
 
@@ -86,8 +88,8 @@ struct CheckedMesh<const D: usize> {
 /// What Gmsh, the reader and the checks refuse.
 pub fn read(session: &Session, scene: &Scene, interrupt: &Interrupt) -> Result<Box<dyn SceneMesh>> {
     match scene.dimension.value {
-        2 => read_in::<2>(session, scene, interrupt, pieces::in_plane),
-        _ => read_in::<3>(session, scene, interrupt, pieces::in_space),
+        2 => read_in::<2>(session, scene, interrupt, pieces::in_plane, Meshes::Plane),
+        _ => read_in::<3>(session, scene, interrupt, pieces::in_space, Meshes::Space),
     }
 }
 
@@ -96,6 +98,7 @@ fn read_in<const D: usize>(
     scene: &Scene,
     interrupt: &Interrupt,
     cut: Cut<D>,
+    keep: fn(Rc<KeptMeshes<D>>) -> Meshes,
 ) -> Result<Box<dyn SceneMesh>>
 where
     [f64; D]: Plain,
@@ -123,7 +126,7 @@ where
         straightened: verified.mesh.straightened,
         notes,
     };
-    Ok(Box::new(CheckedMesh { session: session.clone(), verified, facts, cut, kept: Kept::default() }))
+    Ok(Box::new(CheckedMesh { session: session.clone(), verified, facts, cut, keep, kept: Kept::default() }))
 }
 
 impl<const D: usize> SceneMesh for CheckedMesh<D>
@@ -148,8 +151,8 @@ where
     }
 
     fn discretize(&mut self, scene: &Scene, before: Option<Discrete>, inner: &mut SolverFactory) -> Result<Discrete> {
-        let Self { session, verified, cut, kept, .. } = self;
-        let keep = scene.estimate || scene.adapt.is_some();
+        let Self { session, verified, cut, keep, kept, .. } = self;
+        let keep = (scene.estimate || scene.adapt.is_some()).then_some(*keep);
         let request = Request { scene, verified, cut: *cut, keep };
         let exchange = Rc::new(Ranks::new(session));
         let discrete = discretize::discretize(&request, kept, before, exchange, inner);

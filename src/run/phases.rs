@@ -195,8 +195,8 @@ pub fn estimate(done: &mut Done, clock: &mut Clock) -> Result<Option<Estimate>> 
     let discrete = &mut done.built.discrete;
     let Some(meshes) = discrete.meshes.clone().filter(|_| good) else { return Ok(None) };
     let model = &mut discrete.model;
-    let estimate = estimate::estimate(&*meshes, model, done.method.linear(), iterate, layer)?;
-    if let Some((body, place)) = estimate::lost_at(&*meshes, &discrete.model, &estimate) {
+    let estimate = estimate::estimate(&meshes, model, done.method.linear(), iterate, layer)?;
+    if let Some((body, place)) = estimate::lost_at(&meshes, &discrete.model, &estimate) {
         let (name, place) = (&discrete.bodies[body].name, output::closing::place(place));
         done.warnings.push(format!(
             "the estimated error of the mesh is a guess: it is as large as the solution; of all bodies `{name}` has most of it, at {place}: make \
