@@ -5,7 +5,7 @@
 
 use crate::fem::{Facets, Frame, Space};
 use crate::linalg::dot;
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// Square of the part of a unit vector that supports leave free up to which they hold it. Axes of supports are those of
 /// the scene or of facets, known to 1e-9 or better; a support that is inclined to a plane by more than 1e-3 is none of
@@ -21,7 +21,7 @@ pub struct Mirrors<const D: usize> {
 
 impl<const D: usize> Mirrors<D> {
     /// Find the planes of symmetry that meet a surface.
-    pub fn new(space: &Space<D>, facets: &Facets<D>, prescribed: &HashMap<usize, f64>, frame: &Frame<D>) -> Self {
+    pub fn new(space: &Space<D>, facets: &Facets<D>, prescribed: &BTreeMap<usize, f64>, frame: &Frame<D>) -> Self {
         let is_held = |node: u32, normal: [f64; D]| {
             let components = frame
                 .force(node, normal)

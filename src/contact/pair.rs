@@ -11,7 +11,7 @@ use crate::fem::{Frame, Space, area_vector, cross, length, pad};
 use crate::linalg::{Csr, dot};
 use crate::problem::order::Order;
 use serde::{Deserialize, Deserializer, Serialize};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::rc::Rc;
 
 /// A discretised pair of surfaces: n contact points with one pressure each.
@@ -370,7 +370,7 @@ impl ContactPair {
 
     /// Set the rows of a side from those of the displacements of its nodes, for the dofs of this frame and the values
     /// of those that supports prescribe.
-    pub fn hold<const D: usize>(&mut self, side: usize, frame: &Frame<D>, prescribed: &HashMap<usize, f64>) {
+    pub fn hold<const D: usize>(&mut self, side: usize, frame: &Frame<D>, prescribed: &BTreeMap<usize, f64>) {
         let nodal = &self.nodal[side];
         let mut held = Csr::new(nodal.columns);
         self.prescribed[side].clear();

@@ -20,7 +20,7 @@ pub struct Side<'a, const D: usize> {
     /// The facets, oriented outwards.
     pub facets: Facets<D>,
     /// Values of the prescribed dofs of the body.
-    pub prescribed: &'a HashMap<usize, f64>,
+    pub prescribed: &'a BTreeMap<usize, f64>,
     /// Dofs of nodes with rotated axes and of tied nodes.
     pub frame: &'a Frame<D>,
     /// Planes of symmetry at the end of the surface.
@@ -65,7 +65,7 @@ impl<'a, const D: usize> Side<'a, D> {
         name: &'a str,
         space: &'a Space<D>,
         facets: Facets<D>,
-        prescribed: &'a HashMap<usize, f64>,
+        prescribed: &'a BTreeMap<usize, f64>,
         frame: &'a Frame<D>,
         edge: f64,
     ) -> Self {

@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::model::Model;
 use crate::model::field::Field;
 use crate::model::layer::{Layer, surface_slopes};
-use crate::model::linear::{Failure, LinearStep, System, Trial};
+use crate::model::linear::{LinearStep, Solved, System, Trial};
 use crate::model::rigid::Motions;
 use std::collections::VecDeque;
 
@@ -90,7 +90,7 @@ pub fn respond(
     layer: &Layer,
     loads: &[Vec<f64>],
     share: f64,
-) -> Result<std::result::Result<(Field, f64), Failure>> {
+) -> Result<Solved<(Field, f64)>> {
     let (mut residual, mut work) = (Vec::new(), [0.0]);
     for (slot, load) in model.bodies.iter_mut().zip(loads) {
         let count = if slot.is_rigid { slot.local.as_ref().map_or(0, |_| slot.motions.len()) } else { 0 };

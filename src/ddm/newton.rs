@@ -24,7 +24,7 @@ use crate::model::Model;
 use crate::model::body::Energy;
 use crate::model::field::{Field, LineEnergy, residual, unbalanced};
 use crate::model::layer::Layer;
-use crate::model::linear::{LinearResult, LinearSolution, LinearStep, System, Trial};
+use crate::model::linear::{LinearSolution, LinearStep, Solved, System, Trial};
 
 /// Relative error of the linear system that shows what is left of equilibrium: its size is wanted, which is then known
 /// to a factor of two.
@@ -168,7 +168,7 @@ impl Newton<'_, '_> {
     }
 
     /// Solve the linear step from the states.
-    fn linear_step(&mut self) -> Result<LinearResult> {
+    fn linear_step(&mut self) -> Result<Solved<LinearSolution>> {
         let (model, states) = (&mut *self.run.model, &self.states);
         let springs = resisting(model, states);
         self.added = springs.added;

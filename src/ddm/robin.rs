@@ -18,7 +18,7 @@ use crate::linalg::DIGIT;
 use crate::model::body::Energy;
 use crate::model::field::{Field, residual, unbalanced};
 use crate::model::layer::Layer;
-use crate::model::linear::{Failure, LinearResult, LinearStep, System, Trial};
+use crate::model::linear::{LinearSolution, LinearStep, Solved, System, Trial};
 use crate::model::{INNER_TOLERANCE, Model, closing};
 use crate::robin::Sweep;
 use crate::robin::spectrum::{Interval, interval};
@@ -91,12 +91,7 @@ impl Corrector<'_> {
 
     /// Move the bodies from the motions of a start to displacements of least energy with its trace (2n). With the
     /// matrix of all bodies these have its closings B u; no iterate's closings depend on another part of a start.
-    pub fn extend(
-        &mut self,
-        model: &mut Model,
-        u: &mut Field,
-        trace: &[f64],
-    ) -> Result<std::result::Result<(), Failure>> {
+    pub fn extend(&mut self, model: &mut Model, u: &mut Field, trace: &[f64]) -> Result<Solved<()>> {
         if self.coefficient.is_some() {
             return Ok(extend(model, trace)?.map(|bent| *u = Field { rigid: sums(&u.rigid, &bent.rigid), ..bent }));
         }
@@ -121,7 +116,7 @@ impl Corrector<'_> {
         layer: &Layer,
         springs: &[f64],
         force: &[f64],
-    ) -> Result<(Vec<Vec<f64>>, Energy, LinearResult)> {
+    ) -> Result<(Vec<Vec<f64>>, Energy, Solved<LinearSolution>)> {
         let products = self.linear.multiply(model, &u.displacements);
         let (residual, energy) = residual(model, products, u, force);
         let mut enough = |_: &Model, trial: &Trial| trial.is_within(INNER_TOLERANCE);

@@ -90,7 +90,7 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
     ) -> Result<()> {
         let (load, is_owner) = (part.mesh.load_vector(), owner == self.rank);
         if let Some((mut body, BodySlot { scale, row_stiffness, .. })) = before.serving {
-            body.reload(load, part.mesh.prescribed.clone())?;
+            body.reload(load, part.mesh.prescribed())?;
             (slot.local, slot.scale, slot.row_stiffness) = (Some(body), scale, row_stiffness);
             // the sums of all ranks are known
             slot.row_stiffness.iter_mut().filter(|_| !is_owner).for_each(|stiffness| *stiffness = 0.0);
@@ -106,7 +106,7 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
     /// Assemble the matrix of a body, all of it or the rows of this rank, and make its solver, which takes the contact
     /// rows.
     fn assemble(&mut self, part: &mut SceneBody<D>, load: Vec<f64>, slot: &mut BodySlot) -> Result<()> {
-        let prescribed = part.mesh.prescribed.clone();
+        let prescribed = part.mesh.prescribed();
         let modes = part.mesh.unconstrained_modes.iter();
         let mut unconstrained_modes: Vec<Vec<f64>> = modes.map(|motion| part.mesh.dofs_of(motion)).collect();
         unconstrained_modes.iter_mut().for_each(|motion| prescribed.iter().for_each(|entry| motion[entry.0] = 0.0));

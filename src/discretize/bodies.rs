@@ -255,7 +255,6 @@ pub fn parts<'a, const D: usize>(
             load: NodalForces::default(),
             unconstrained_modes: Vec::new(),
             unsupported_modes: Vec::new(),
-            prescribed: Vec::new(),
             owned: None,
             is_owned: true,
             graph: OnceCell::new(),

@@ -42,8 +42,6 @@ pub struct BodyMesh<const D: usize> {
     pub unconstrained_modes: Vec<RigidMotion<D>>,
     /// Rigid motions that supports alone leave.
     pub unsupported_modes: Vec<RigidMotion<D>>,
-    /// Prescribed (dof, value), sorted by dof.
-    pub prescribed: Vec<(usize, f64)>,
     /// Dofs of this rank, if the body is distributed.
     pub owned: Option<OwnedDofs>,
     /// Whether this rank owns the body or nodes of it. Other ranks have it for estimates of the error.
@@ -88,8 +86,7 @@ impl<const D: usize> BodyMesh<D> {
     /// Return the products of the rigid motions that supports and springs leave, over all dofs without the prescribed
     /// ones.
     pub fn products(&self) -> DMatrix<f64> {
-        let (count, mut held) =
-            (self.unconstrained_modes.len(), self.prescribed.iter().map(|entry| entry.0).peekable());
+        let (count, mut held) = (self.unconstrained_modes.len(), self.held.prescribed.keys().copied().peekable());
         let mut products = DMatrix::zeros(count, count);
         for node in 0..self.space.nodes.len() {
             let mut at: Vec<[f64; D]> =
@@ -110,10 +107,8 @@ impl<const D: usize> BodyMesh<D> {
     }
 
     /// Return the prescribed (dof, value), sorted by dof.
-    pub fn prescribed_sorted(&self) -> Vec<(usize, f64)> {
-        let mut all: Vec<_> = self.held.prescribed.iter().map(|(&dof, &value)| (dof, value)).collect();
-        all.sort_unstable_by_key(|entry| entry.0);
-        all
+    pub fn prescribed(&self) -> Vec<(usize, f64)> {
+        self.held.prescribed.iter().map(|(&dof, &value)| (dof, value)).collect()
     }
 
     /// Return the combination of the `rigid_modes` that comes nearest to the prescribed displacements in the sum of
@@ -121,7 +116,7 @@ impl<const D: usize> BodyMesh<D> {
     pub fn imposed_motion(&self, rigid_modes: &[RigidMotion<D>]) -> RigidMotion<D> {
         let mut squares = DMatrix::zeros(rigid_modes.len(), rigid_modes.len());
         let mut work = DVector::zeros(rigid_modes.len());
-        for &(dof, value) in &self.prescribed {
+        for (&dof, &value) in &self.held.prescribed {
             let at =
                 DVector::from_iterator(rigid_modes.len(), rigid_modes.iter().map(|motion| self.dof_of(motion, dof)));
             squares.ger(1.0, &at, &at, 1.0);
@@ -132,11 +127,8 @@ impl<const D: usize> BodyMesh<D> {
 
     /// Return the combinations of the `rigid_modes` that supports leave.
     pub fn unsupported(&self, rigid_modes: &[RigidMotion<D>]) -> Vec<RigidMotion<D>> {
-        let left = rigid::left_by_supports(
-            rigid_modes.len(),
-            |k, dof| self.dof_of(&rigid_modes[k], dof),
-            &self.prescribed_sorted(),
-        );
+        let left =
+            rigid::left_by_supports(rigid_modes.len(), |k, dof| self.dof_of(&rigid_modes[k], dof), &self.prescribed());
         left.iter().map(|weights| rigid::combine(rigid_modes, weights)).collect()
     }
 

@@ -78,7 +78,7 @@ impl<const D: usize> MatrixInputs<D> {
             elasticity: part.elasticity.clone(),
             springs: mesh.springs.clone(),
             frame: mesh.held.frame.clone(),
-            supported: mesh.prescribed_sorted().into_iter().map(|(dof, u)| (dof, u != 0.0)).collect(),
+            supported: mesh.prescribed().into_iter().map(|(dof, u)| (dof, u != 0.0)).collect(),
             prescribed: Vec::new(),
             rows: Csr::default(),
         }
@@ -87,7 +87,7 @@ impl<const D: usize> MatrixInputs<D> {
     /// Add the contact rows, and the dofs that are fixed.
     pub fn complete(&mut self, body: &WholeBody<D>) {
         self.rows = body.part.mesh.rows.clone();
-        self.prescribed = body.part.mesh.prescribed.iter().map(|entry| entry.0).collect();
+        self.prescribed = body.part.mesh.held.prescribed.keys().copied().collect();
     }
 
     /// Return whether both bodies have the same material.

@@ -135,7 +135,6 @@ impl Partition {
         let nodes = self.nodes(number, body, &cells, rank);
         let here = |node: u32| place(&nodes, node);
         let dof_here = |dof: usize| Some(D * here((dof / D) as u32)? as usize + dof % D);
-        let prescribed_here = |&(dof, u): &(usize, f64)| Some((dof_here(dof)?, u));
         let rows_here = |rows: &Csr| rows.of_columns(D * nodes.len(), dof_here);
         let spring_here = |&NodalBlock { nodes: [a, b], block }: &NodalBlock<D>| {
             Some(NodalBlock { nodes: [here(a)?, here(b)?], block })
@@ -159,7 +158,6 @@ impl Partition {
             load: body.load.only(is_assembled).on(&nodes),
             unconstrained_modes: body.unconstrained_modes.clone(),
             unsupported_modes: body.unsupported_modes.clone(),
-            prescribed: body.prescribed.iter().filter_map(prescribed_here).collect(),
             is_owned: true,
             graph: OnceCell::new(),
             owned: Some(self.owned::<D>(number, &nodes, &body.rows, rank)),

@@ -127,10 +127,7 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     let mechanisms = mechanism::fix(&mut bodies, &mut pairs, lack);
     let is_through: Vec<bool> = kept.pairs.iter().map(|inputs| inputs.is_through).collect();
     let rigid = rigid::all(scene, &mut pairs, &is_through, bodies.len())?;
-    for (body, inputs) in bodies.iter_mut().zip(&mut kept.bodies) {
-        body.part.mesh.prescribed = body.part.mesh.prescribed_sorted();
-        inputs.complete(body);
-    }
+    kept.bodies.iter_mut().zip(&bodies).for_each(|(inputs, body)| inputs.complete(body));
     let has_matrix =
         |(i, body): (usize, &MatrixInputs<D>)| before.bodies.get(i).is_some_and(|it| body.has_matrix_of(it));
     let mut is_kept: Vec<bool> = kept.bodies.iter().enumerate().map(has_matrix).collect();
@@ -165,7 +162,7 @@ fn plan<const D: usize, F: Factory>(
         let (spec, mesh) = (part.spec, &part.mesh);
         let at = |k: usize, dof: usize| mesh.dof_of(&rigid_modes[k], dof);
         let motions = AtDofs { count: rigid_modes.len(), at: &at };
-        let interface = InterfaceDofs::new(D, &mesh.rows, &mesh.prescribed, motions);
+        let interface = InterfaceDofs::new(D, &mesh.rows, &mesh.prescribed(), motions);
         let facts = BodyFacts {
             name: spec.name.value.clone(),
             dimension: D,

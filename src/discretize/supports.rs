@@ -11,7 +11,7 @@ use crate::mesh::{Group, Mesh};
 use crate::problem::{BodySpec, LoadKind, SpringKind, SpringSpec};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 
 /// One condition n.u = value at a node, with the direction n.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
@@ -30,7 +30,7 @@ pub struct Constraints<const D: usize> {
     /// Coordinates in which conditions are prescribed dofs.
     pub frame: Frame<D>,
     /// Prescribed dofs and their values.
-    pub prescribed: HashMap<usize, f64>,
+    pub prescribed: BTreeMap<usize, f64>,
     /// Conditions with independent directions at each node. Those of tied nodes are at their master.
     conditions: BTreeMap<u32, Vec<Condition<D>>>,
     /// The rigid surfaces.

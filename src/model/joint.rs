@@ -8,7 +8,7 @@
 
 use super::coarse::RigidSpace;
 use super::field::add_forces;
-use super::linear::{Failure, LinearResult, LinearSolution, LinearStep, StoppingTest, System, Trial};
+use super::linear::{Failure, LinearSolution, LinearStep, Solved, StoppingTest, System, Trial};
 use super::rigid_parts::{ACCURACY, RigidParts, WithoutRigidParts};
 use super::{BodySlot, Distribution, Dofs, Field, Model, closing};
 use crate::error::{Error, Kind, Result};
@@ -94,7 +94,7 @@ impl JointStep {
         r: &[f64],
         x: &mut [f64],
         enough: &mut StoppingTest,
-    ) -> Result<std::result::Result<Option<f64>, String>> {
+    ) -> Result<Solved<Option<f64>>> {
         let (rows, first, mut last_error) = (&self.rows, self.first, None);
         let mut test = |iterate: &KspIterate| {
             let (closing, energy) = closing_and_energy(model, rows, first, iterate.x, r);
@@ -103,7 +103,7 @@ impl JointStep {
             enough(model, &Trial { closing: &closing, energy, error })
         };
         let failure = self.matrix.apply(|solver| solver.solve_until(r, x, &mut test))?.failure;
-        Ok(failure.map_or(Ok(last_error), Err))
+        Ok(failure.map_or(Ok(last_error), |reason| Err(Failure { body: None, reason })))
     }
 
     /// Bring the rigid parts around the matrix to its springs. Return why a solver gave up, if it did.
@@ -205,7 +205,7 @@ impl LinearStep for JointStep {
         self.apart(&y, v)
     }
 
-    fn solve(&mut self, system: System) -> Result<LinearResult> {
+    fn solve(&mut self, system: System) -> Result<Solved<LinearSolution>> {
         let System { model, springs, residual, enough, .. } = system;
         let mut r = self.load(model, residual);
         if self.is_redundant {
@@ -227,10 +227,10 @@ impl LinearStep for JointStep {
         let mut x = vec![0.0; r.len()];
         let (mut last_error, failure) = match self.solve_matrix(model, &r, &mut x, &mut test)? {
             Ok(last_error) => (last_error, None),
-            Err(reason) => (None, Some(reason)),
+            Err(failure) => (None, Some(failure)),
         };
-        if let (false, Some(reason)) = (self.is_redundant, &failure) {
-            return Ok(Err(Failure { body: None, reason: reason.clone() }));
+        if let (false, Some(failure)) = (self.is_redundant, &failure) {
+            return Ok(Err(failure.clone()));
         }
         let local = self.parts().zip(residual).filter(|(_, r)| !r.is_empty());
         let energy = local.map(|(part, _)| dot(&x[part.clone()], &r[part])).sum::<f64>();
@@ -240,7 +240,7 @@ impl LinearStep for JointStep {
         let (mut energy, failures) = (sums[0], sums[1]);
         if failures > 0.0 {
             let elsewhere = || "the matrix of all bodies cannot be factored on another rank".to_owned();
-            return Ok(Err(Failure { body: None, reason: failure.unwrap_or_else(elsewhere) }));
+            return Ok(Err(failure.unwrap_or_else(|| Failure { body: None, reason: elsewhere() })));
         }
         if let Some(parts) = &parts {
             let moved = parts.moved(&works, &field.closing());
@@ -274,12 +274,7 @@ impl WithoutRigidParts for JointStep {
         closing(trace).collect()
     }
 
-    fn solve_bodies(
-        &mut self,
-        model: &mut Model,
-        force: &[f64],
-        near: Option<Field>,
-    ) -> Result<std::result::Result<(Field, f64), Failure>> {
+    fn solve_bodies(&mut self, model: &mut Model, force: &[f64], near: Option<Field>) -> Result<Solved<(Field, f64)>> {
         let mut x = near.unwrap_or_else(|| Field::zero(model));
         let mut rest = self.multiply(model, &x.displacements);
         rest.iter_mut().flatten().for_each(|r| *r = -*r);
@@ -291,7 +286,7 @@ impl WithoutRigidParts for JointStep {
         let mut enough = |_: &Model, trial: &Trial| trial.error <= ACCURACY * (known + trial.energy).sqrt();
         let last_error = match self.solve_matrix(model, &load, &mut change, &mut enough)? {
             Ok(last_error) => last_error,
-            Err(reason) => return Ok(Err(Failure { body: None, reason })),
+            Err(failure) => return Ok(Err(failure)),
         };
         let [displacements, apart] = self.displacements(&change, &rest);
         x.add(1.0, &Field::of_step(model, displacements, &apart, &[]).0);

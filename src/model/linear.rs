@@ -67,8 +67,8 @@ pub struct Failure {
     pub reason: String,
 }
 
-/// The outcome of solving a system.
-pub type LinearResult = std::result::Result<LinearSolution, Failure>;
+/// What a solver found, or why it gave up. Failures of the solver library itself are errors of the program.
+pub type Solved<T> = Result<T, Failure>;
 
 /// A solver of the linear step.
 pub trait LinearStep {
@@ -104,8 +104,8 @@ pub trait LinearStep {
     /// Solve a system. Collective.
     ///
     /// # Errors
-    /// Failures of the solver library. A solver that does not reach its tolerance is reported in [`LinearResult`].
-    fn solve(&mut self, system: System) -> Result<LinearResult>;
+    /// Failures of the solver library. A solver that does not reach its tolerance is reported in [`Solved`].
+    fn solve(&mut self, system: System) -> Result<Solved<LinearSolution>>;
 
     /// Return the largest relative error with which a step is taken. Newton's method converges with any relative error
     /// below one, but more slowly the larger it is (Dembo, Eisenstat, Steihaug, Inexact Newton methods, 1982).

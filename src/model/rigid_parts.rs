@@ -15,7 +15,7 @@
 
 use super::Model;
 use super::field::{Field, local_dot};
-use super::linear::Failure;
+use super::linear::Solved;
 use super::rigid::Motions;
 use crate::error::Result;
 use crate::linalg::dot;
@@ -56,12 +56,7 @@ pub trait WithoutRigidParts {
 
     /// Solve G x = B' `force` for forces at the points, n, starting from `near`. Return x with the estimated energy
     /// norm of its error. Collective.
-    fn solve_bodies(
-        &mut self,
-        model: &mut Model,
-        force: &[f64],
-        near: Option<Field>,
-    ) -> Result<std::result::Result<(Field, f64), Failure>>;
+    fn solve_bodies(&mut self, model: &mut Model, force: &[f64], near: Option<Field>) -> Result<Solved<(Field, f64)>>;
 
     /// Return K v for the displacements v of every local body. Collective.
     fn multiply_bodies(&mut self, model: &mut Model, v: &[Vec<f64>]) -> Vec<Vec<f64>>;
@@ -105,7 +100,7 @@ impl RigidParts {
         system: &mut dyn WithoutRigidParts,
         model: &mut Model,
         springs: &[f64],
-    ) -> Result<std::result::Result<Option<Self>, Failure>> {
+    ) -> Result<Solved<Option<Self>>> {
         if known.as_ref().is_some_and(|known| known.springs == springs) {
             return Ok(Ok(known));
         }

@@ -11,7 +11,7 @@ use crate::error::Result;
 use crate::linalg::{DIGIT, Factor, axpy, dot};
 use crate::model::Model;
 use crate::model::field::{Field, add_forces, local_dot};
-use crate::model::linear::{Failure, LinearResult, LinearSolution, LinearStep, StoppingTest, System, Trial};
+use crate::model::linear::{Failure, LinearSolution, LinearStep, Solved, StoppingTest, System, Trial};
 use crate::model::rigid::Motions;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
@@ -51,7 +51,7 @@ impl LinearStep for SweepCg {
         "newton-robin"
     }
 
-    fn solve(&mut self, system: System) -> Result<LinearResult> {
+    fn solve(&mut self, system: System) -> Result<Solved<LinearSolution>> {
         let System { model, layer, springs, residual, enough } = system;
         model.set_tolerance(ROUGH)?;
         if let Some(coefficient) = &mut self.coefficient {
@@ -103,7 +103,7 @@ pub(super) fn conjugate_gradients(
     residual: &[Vec<f64>],
     (enough, most): (&mut StoppingTest, usize),
     least: f64,
-) -> Result<std::result::Result<(LinearSolution, Lanczos), Failure>> {
+) -> Result<Solved<(LinearSolution, Lanczos)>> {
     let mut state = Gradients::new(model, springs, residual, least);
     let squared = loop {
         let before = state.previous.as_ref().map_or(&state.r, |previous| &previous.residual);

@@ -7,7 +7,7 @@ use crate::linalg::{Blocks, axpy, dot};
 use crate::model::body::Energy;
 use crate::model::field::{Field, add_forces, residual};
 use crate::model::layer::Layer;
-use crate::model::linear::Failure;
+use crate::model::linear::{Failure, Solved};
 use crate::model::rigid::{self, NamedMotion, TOLERANCE, combined};
 use crate::model::rigid_parts::{RigidParts, WithoutRigidParts};
 use crate::model::{Model, closing};
@@ -157,12 +157,7 @@ impl WithoutRigidParts for Sweeper {
         rows
     }
 
-    fn solve_bodies(
-        &mut self,
-        model: &mut Model,
-        force: &[f64],
-        _near: Option<Field>,
-    ) -> Result<std::result::Result<(Field, f64), Failure>> {
+    fn solve_bodies(&mut self, model: &mut Model, force: &[f64], _near: Option<Field>) -> Result<Solved<(Field, f64)>> {
         let mut residual = Field::zero(model).displacements;
         add_forces(model, force, &mut residual);
         let sweep = self.solve(model, residual, Energy::default(), None, 0)?;
@@ -352,7 +347,7 @@ pub fn stiff_joint_springs(model: &Model) -> Vec<f64> {
 ///
 /// The sweep (41) depends on the iterate through its traces only, so a start is a trace. The extension minimises the
 /// energy of the body among all displacements with that trace, which springs much stiffer than the body impose.
-pub fn extend(model: &mut Model, trace: &[f64]) -> Result<std::result::Result<Field, Failure>> {
+pub fn extend(model: &mut Model, trace: &[f64]) -> Result<Solved<Field>> {
     let springs = stiff_springs(model);
     model.robin(&springs)?;
     let mut iterate = Field::rest(model);

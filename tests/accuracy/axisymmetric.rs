@@ -2,7 +2,7 @@
 
 use crate::common::here::solve_here;
 use crate::common::{Report, Scene, nanoseconds, root, solve, winkler};
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::f64::consts::PI;
 use winkler::api::Order;
 use winkler::api::load as load_scene;
@@ -394,7 +394,7 @@ fn normals_on_the_axis() {
         let space = Space::new(&mesh, mesh.group("inner").expect("a body"), degree);
         let space = space.revolved();
         let facets = space.facets(mesh.group("inner_contact").expect("a surface"));
-        let (free, frame) = (HashMap::new(), Frame::default());
+        let (free, frame) = (BTreeMap::new(), Frame::default());
         let side = Side::new("inner_contact", &space, facets, &free, &frame, 180.0);
         let on_axis: Vec<_> = side.nodes.iter().filter(|at| space.on_axis(at.node)).collect();
         assert_eq!(on_axis.len(), 1);

@@ -2,7 +2,7 @@
 
 use crate::common::vtu::Grid;
 use crate::common::{Scene, case, distance, solve, text_of, winkler};
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use winkler::api::Order;
 use winkler::api::load as load_scene;
 use winkler::internals::Interrupt;
@@ -93,7 +93,7 @@ fn pair_on<const D: usize>(
     bodies: [&str; 2],
     groups: [&str; 2],
 ) -> (ContactPair, Vec<Space<D>>) {
-    let (free, frame) = (HashMap::new(), Frame::default());
+    let (free, frame) = (BTreeMap::new(), Frame::default());
     let spaces: Vec<Space<D>> =
         (0..2).map(|k| Space::new(mesh, mesh.group(bodies[k]).expect("a body"), order[k])).collect();
     let side = |k: usize| {

@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed, TestRunner};
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::rc::Rc;
 use winkler::api::Order;
 use winkler::internals::contact::pieces::{self, Cut, Reach};
@@ -265,7 +265,7 @@ fn shot<const D: usize>(a: &Side<D>, b: &Side<D>, reach: &Reach) -> [f64; 2] {
 
 /// What must hold for any pair; `slack` is how far the shots may be off, as a share of side a.
 fn check<const D: usize>(surfaces: &[Surface; 2], cut: Cut<D>, slack: f64) -> Result<(), TestCaseError> {
-    let (free, frame) = (HashMap::new(), Frame::default());
+    let (free, frame) = (BTreeMap::new(), Frame::default());
     let meshes = surfaces.each_ref().map(Surface::mesh::<D>);
     let spaces: [Space<D>; 2] =
         std::array::from_fn(|k| Space::new(&meshes[k], meshes[k].group("body").expect("a body"), surfaces[k].order));
