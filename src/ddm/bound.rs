@@ -22,7 +22,7 @@ use crate::linalg::dot;
 use crate::model::Model;
 use crate::model::layer::{Layer, in_series, surface_slopes};
 use crate::model::linear::LinearSolution;
-use crate::model::rigid::PART;
+use crate::model::motions::PART;
 
 /// Energy norm of the unbalanced forces, relative to bodies and layers, up to which a linear step is exact: half of the
 /// digits, the root of epsilon. An inexact factorisation leaves more, and no bound holds then.

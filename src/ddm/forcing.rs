@@ -7,7 +7,7 @@ use crate::model::Model;
 use crate::model::field::Field;
 use crate::model::layer::{Layer, surface_slopes};
 use crate::model::linear::{LinearStep, Solved, System, Trial};
-use crate::model::rigid::Motions;
+use crate::model::motions::Motions;
 use std::collections::VecDeque;
 
 /// Iterations over which the change of the pressures estimates their error before these iterations, as the gain of

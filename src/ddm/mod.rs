@@ -37,15 +37,15 @@
 mod bound;
 mod forcing;
 pub mod gamma;
+mod history;
 mod newton;
 pub mod robin;
-mod run;
 mod solve;
 mod start;
 mod step;
 mod stop;
 
 pub use forcing::respond;
-pub use run::{Observer, Outcome, Row, Silent};
+pub use history::{Observer, Outcome, Row, Silent};
 pub use solve::{InitialGuess, Method, Solution, first_springs, solve};
 pub use stop::Status;

@@ -14,7 +14,7 @@
 
 use super::bound::{EXACT, Reached, compression_roundoff};
 use super::forcing::{Forcing, resisting};
-use super::run::{Outcome, Row, Run};
+use super::history::{Outcome, Row, Run};
 use super::start::SEARCH;
 use super::step::{Equilibrium, Progress, StepLength};
 use super::stop::{Stagnation, Status, falls, roundoff};

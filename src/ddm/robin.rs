@@ -10,7 +10,7 @@
 
 use super::forcing::resisting;
 use super::gamma::{GammaRule, Iterate};
-use super::run::{Outcome, Row, Run};
+use super::history::{Outcome, Row, Run};
 use super::stop::Status;
 use crate::error::Result;
 use crate::exchange::{self, ASKS};

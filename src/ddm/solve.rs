@@ -4,8 +4,8 @@
 use super::bound::{EXACT, Scale, pressure_roundoff};
 use super::forcing::resisting;
 use super::gamma::GammaRule;
+use super::history::{Observer, Outcome, Run};
 use super::robin::Corrector;
-use super::run::{Observer, Outcome, Run};
 use super::start::{self, RigidStart};
 use super::stop::Status;
 use super::{newton, robin};
@@ -14,7 +14,7 @@ use crate::linalg::{DIGIT, axpy};
 use crate::model::field::{Field, residual};
 use crate::model::layer::{Layer, surface_slopes};
 use crate::model::linear::LinearStep;
-use crate::model::rigid::{self, Motions, NamedMotion};
+use crate::model::motions::{self, Motions, NamedMotion};
 use crate::model::{INNER_TOLERANCE, Model};
 use crate::problem::method::StopRule;
 use crate::robin::sweep::{Coefficient, Sweeper, underconstrained};
@@ -113,7 +113,7 @@ impl Run<'_> {
         let is_near = is_known && known.is_none();
         let has_displacements = known.is_some();
         let mut u = known.unwrap_or_else(|| Field { rigid: self.motions_of(&amounts), ..Field::rest(self.model) });
-        let fallen = rigid::trace(self.model, &u.rigid);
+        let fallen = motions::trace(self.model, &u.rigid);
         self.model.close_gap(&fallen);
         match method {
             Method::Newton(linear) => {
@@ -157,7 +157,7 @@ impl Run<'_> {
 
     /// Return the result of a run whose loop has ended.
     fn conclude(mut self, mut end: Outcome, method: &mut Method) -> Outcome {
-        axpy(1.0, &rigid::trace(self.model, &end.iterate.rigid), &mut end.iterate.trace);
+        axpy(1.0, &motions::trace(self.model, &end.iterate.rigid), &mut end.iterate.trace);
         self.model.gap = std::mem::take(&mut self.gap);
         let surfaces = surface_slopes(self.model);
         let answer: Vec<f64> = end.answer.iter().zip(surfaces).map(|(rho, surface)| surface.max(*rho)).collect();

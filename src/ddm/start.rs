@@ -25,7 +25,7 @@ use crate::linalg::{Blocks, axpy, dot};
 use crate::model::Model;
 use crate::model::field::{self, Unbounded};
 use crate::model::layer::{Layer, contact_slopes, in_series, surface_slopes};
-use crate::model::rigid::{Motions, NamedMotion, PART};
+use crate::model::motions::{Motions, NamedMotion, PART};
 use nalgebra::DVector;
 
 /// The start of a run.

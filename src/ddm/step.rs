@@ -19,7 +19,7 @@
 
 use crate::model::Model;
 use crate::model::layer::{Layer, meeting_slopes};
-use crate::model::rigid::PART;
+use crate::model::motions::PART;
 
 /// What Newton's method remembers of its steps.
 #[derive(Debug, Clone, Default)]

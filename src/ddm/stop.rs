@@ -3,7 +3,7 @@
 use super::bound::EXACT;
 use crate::model::Mechanism;
 use crate::model::linear::Failure;
-use crate::model::rigid::NamedMotion;
+use crate::model::motions::NamedMotion;
 
 /// How a run ended.
 #[derive(Debug, Clone, PartialEq)]

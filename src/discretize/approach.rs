@@ -1,8 +1,8 @@
 //! The displacement of a body towards its contact, as a row of weights of nodal displacements for each of its contact
 //! surfaces.
 
-use super::bodies::SceneBody;
 use super::groups::Line;
+use super::scene_body::SceneBody;
 use super::supports::axis_vector;
 use crate::contact::ContactPair;
 use crate::error::Result;

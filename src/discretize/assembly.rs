@@ -1,9 +1,9 @@
 //! The step from what one rank has of a body to its matrix and its solver, which a factory makes.
 
-use super::bodies::{SceneBody, elasticity_of};
-use super::body::BodyMesh;
+use super::body_mesh::BodyMesh;
 use super::facts::BodyInfo;
 use super::post::FemBody;
+use super::scene_body::{SceneBody, elasticity_of};
 use crate::error::Result;
 use crate::exchange::Plain;
 use crate::fem::rigid;

@@ -1,7 +1,7 @@
 //! Pairs that rules of the scene find: boundary facets of different bodies that face each other within a distance.
 
-use super::bodies::SceneBody;
 use super::patterns::pattern;
+use super::scene_body::SceneBody;
 use crate::contact::Side;
 use crate::contact::pieces::{BoxTree, Cut, Reach};
 use crate::error::{Error, Located, Place, Result, few};

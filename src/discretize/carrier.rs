@@ -1,6 +1,6 @@
 //! Which of two surfaces carries the contact points of their pairs.
 
-use super::bodies::SceneBody;
+use super::scene_body::SceneBody;
 use crate::fem::{Facets, area_vector, length};
 use crate::problem::contact::Carrier;
 use crate::problem::order::Order;

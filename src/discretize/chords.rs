@@ -1,7 +1,7 @@
 //! How much of the balance that loads have on curved surfaces they may lack on the facets of a mesh.
 
-use super::bodies::SceneBody;
 use super::groups::Line;
+use super::scene_body::SceneBody;
 use crate::error::Result;
 use crate::fem::{Facets, Space, minus, unit};
 use crate::linalg::dot;

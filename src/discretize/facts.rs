@@ -1,7 +1,7 @@
 //! What all ranks have of a body: the arrays of the model, and the facts that reports need.
 
 use super::post::Post;
-use super::whole::WholeBody;
+use super::whole_body::WholeBody;
 use crate::contact::ContactPair;
 use crate::fem;
 use crate::linalg::dot;

@@ -1,10 +1,10 @@
 //! What one problem leaves for another on the same mesh: what its matrices and pairs were made of. The next problem
 //! makes only what differs.
 
-use super::bodies::SceneBody;
 use super::pairs::{Contact, ContactFacts, KeptPairs, PairInputs};
 use super::partition::Partition;
-use super::whole::WholeBody;
+use super::scene_body::SceneBody;
+use super::whole_body::WholeBody;
 use crate::contact::ContactPair;
 use crate::fem::{Elasticity, Frame, NodalBlock, Space};
 use crate::linalg::Csr;

@@ -11,7 +11,7 @@
 //! If the loads do work on it, there is no solution, and the run reports this. Loads that balance on the true surfaces
 //! may lack balance on facets, and by quadrature. A small imbalance is taken from the loads, with a warning.
 
-use super::whole::{NO_WORK, WholeBody};
+use super::whole_body::{NO_WORK, WholeBody};
 use crate::contact::ContactPair;
 use crate::error::{few, joined};
 use crate::fem::{PointExtent, RigidMotion, length, minus, rigid, unit};

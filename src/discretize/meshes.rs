@@ -1,6 +1,6 @@
 //! The meshes without their space dimension, as an estimate of the error uses them.
 
-use super::body::BodyMesh;
+use super::body_mesh::BodyMesh;
 use super::post::FemBody;
 use crate::contact::{Fine, FinePoints};
 use crate::fem::{Errors, Recovery, Split, element};

@@ -2,10 +2,10 @@
 //! surfaces do not face each other.
 
 use super::auto::{self, SurfacePair};
-use super::bodies::SceneBody;
 use super::carrier;
+use super::contact_surface::ContactSurface;
 use super::groups::{Owners, find_group, point};
-use super::surface::ContactSurface;
+use super::scene_body::SceneBody;
 use crate::contact::law::{self, OwnLaws};
 use crate::contact::pieces::{Cut, Intersection, Reach};
 use crate::contact::{self, Chords, ContactPair, Fault, Fine, Mirrors, Side};

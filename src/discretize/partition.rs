@@ -1,9 +1,9 @@
 //! The partition of the nodes of bodies over the ranks. Each node of the bodies in one matrix has one owner, and a
 //! number in that matrix. The coupling of the nodes determines the work and the memory of each.
 
-use super::body::BodyMesh;
-use super::owned::OwnedDofs;
-use super::whole::WholeBody;
+use super::body_mesh::BodyMesh;
+use super::owned_dofs::OwnedDofs;
+use super::whole_body::WholeBody;
 use crate::contact::ContactPair;
 use crate::exchange::Serial;
 use crate::fem::{NodalBlock, Space, place};

@@ -1,7 +1,7 @@
 //! Evaluation of the displacements of a body: fields for output, forces and their balance, errors against a known
 //! solution. Each rank evaluates its part.
 
-use super::body::BodyMesh;
+use super::body_mesh::BodyMesh;
 use super::groups::point;
 use crate::contact::add;
 use crate::error::{Error, Result};

@@ -3,16 +3,16 @@
 //! The factory requests facts about each body, chooses solvers, and decides which bodies share a matrix.
 
 use super::assembly::Factory;
-use super::bodies::parts;
-use super::body::BodyMesh;
+use super::body_mesh::BodyMesh;
 use super::facts::BodyInfo;
 use super::kept::{EarlierPair, Kept, MatrixInputs};
 use super::meshes::{KeptMeshes, Meshes};
 use super::pairs::{self, Contact, ContactFacts, Contacts};
 use super::partition::Partition;
+use super::scene_body::parts;
 use super::verify::Verified;
-use super::whole::WholeBody;
-use super::{chords, mechanism, rigid};
+use super::whole_body::WholeBody;
+use super::{chords, mechanism, obstacle};
 use crate::contact::pieces::Cut;
 use crate::contact::{self, ContactPair};
 use crate::error::Result;
@@ -126,7 +126,7 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     let mut bodies = WholeBody::all(parts, &pairs, mesh)?;
     let mechanisms = mechanism::fix(&mut bodies, &mut pairs, lack);
     let is_through: Vec<bool> = kept.pairs.iter().map(|inputs| inputs.is_through).collect();
-    let rigid = rigid::all(scene, &mut pairs, &is_through, bodies.len())?;
+    let rigid = obstacle::all(scene, &mut pairs, &is_through, bodies.len())?;
     kept.bodies.iter_mut().zip(&bodies).for_each(|(inputs, body)| inputs.complete(body));
     let has_matrix =
         |(i, body): (usize, &MatrixInputs<D>)| before.bodies.get(i).is_some_and(|it| body.has_matrix_of(it));

@@ -7,7 +7,7 @@
 
 use crate::discretize::meshes::KeptMeshes;
 use crate::linalg::dot;
-use crate::model::rigid::Motions;
+use crate::model::motions::Motions;
 use crate::model::{Layer, Model};
 use nalgebra::{DMatrix, DVector};
 

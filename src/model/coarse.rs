@@ -1,6 +1,6 @@
 //! The free rigid motions of all bodies as a coarse space around a preconditioner of PETSc.
 
-use super::rigid::Motions;
+use super::motions::Motions;
 use super::{BodySlot, Model, Motion, Segment};
 use crate::error::Result;
 use crate::exchange::Exchange;

@@ -3,7 +3,7 @@
 
 use super::body::{Body, Energy};
 use super::layer::Layer;
-use super::{BodySlot, Model, closing, rigid};
+use super::{BodySlot, Model, closing, motions};
 use crate::linalg::{axpy, dot};
 
 /// Displacements v + E a of all bodies, with rigid motions E that supports and springs leave free.
@@ -65,7 +65,7 @@ impl Field {
         for (index, body) in model.locals() {
             body.dofs().add_motions(-1.0, &field.rigid[index], &mut field.displacements[index]);
         }
-        axpy(1.0, &rigid::trace(model, &fallen), &mut field.trace);
+        axpy(1.0, &motions::trace(model, &fallen), &mut field.trace);
         field.rigid.iter_mut().zip(&fallen).for_each(|(rigid, a)| axpy(1.0, a, rigid));
         (field, numbers.collect())
     }
@@ -97,7 +97,7 @@ impl Field {
     /// Add t `step` to an iterate, whose rigid part goes into the gap of the model.
     pub fn advance(&mut self, model: &mut Model, t: f64, step: &Field) {
         let fall: Vec<Vec<f64>> = step.rigid.iter().map(|amounts| amounts.iter().map(|a| t * a).collect()).collect();
-        let falling = rigid::trace(model, &fall);
+        let falling = motions::trace(model, &fall);
         self.add(t, step);
         axpy(-1.0, &falling, &mut self.trace);
         model.close_gap(&falling);

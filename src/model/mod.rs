@@ -12,7 +12,7 @@ pub mod field;
 pub mod joint;
 pub mod layer;
 pub mod linear;
-pub mod rigid;
+pub mod motions;
 pub mod rigid_parts;
 
 pub use crate::solver::cost::{BodyFacts, compactness};
@@ -24,7 +24,7 @@ pub use field::Field;
 pub use joint::JointStep;
 pub use layer::Layer;
 pub use linear::LinearStep;
-pub use rigid::NamedMotion;
+pub use motions::NamedMotion;
 
 use crate::contact::ContactPair;
 use crate::error::Result;

@@ -16,7 +16,7 @@
 use super::Model;
 use super::field::{Field, local_dot};
 use super::linear::Solved;
-use super::rigid::Motions;
+use super::motions::Motions;
 use crate::error::Result;
 use crate::linalg::dot;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};

@@ -12,7 +12,7 @@ use crate::linalg::{DIGIT, Factor, axpy, dot};
 use crate::model::Model;
 use crate::model::field::{Field, add_forces, local_dot};
 use crate::model::linear::{Failure, LinearSolution, LinearStep, Solved, StoppingTest, System, Trial};
-use crate::model::rigid::Motions;
+use crate::model::motions::Motions;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 /// Most iterations of a linear step: long before, rounding spoils the conjugacy of the directions.

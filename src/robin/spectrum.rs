@@ -8,7 +8,7 @@ use crate::model::Model;
 use crate::model::field::{Field, zero};
 use crate::model::layer::Layer;
 use crate::model::linear::Trial;
-use crate::model::rigid::Motions;
+use crate::model::motions::Motions;
 
 /// Bounds of F1'' in the norm of the Robin form G over the level set {F1 <= F1(u0)} of the start u0, which an iteration
 /// that descends never leaves: `lower` G <= F1'' <= `upper` G. A layer has such constants on bounded ranges only.

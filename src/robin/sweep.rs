@@ -8,7 +8,7 @@ use crate::model::body::Energy;
 use crate::model::field::{Field, add_forces, residual};
 use crate::model::layer::Layer;
 use crate::model::linear::{Failure, Solved};
-use crate::model::rigid::{self, NamedMotion, TOLERANCE, combined};
+use crate::model::motions::{self, NamedMotion, TOLERANCE, combined};
 use crate::model::rigid_parts::{RigidParts, WithoutRigidParts};
 use crate::model::{Model, closing};
 use crate::problem::method::{RobinRule, Zone};
@@ -368,7 +368,7 @@ pub fn extend(model: &mut Model, trace: &[f64]) -> Result<Solved<Field>> {
     }
     // with the traces of the rigid parts, which go into the gap
     iterate.add(1.0, &sweep.correction);
-    let fallen = rigid::trace(model, &iterate.rigid);
+    let fallen = motions::trace(model, &iterate.rigid);
     axpy(-1.0, &fallen, &mut iterate.trace);
     model.close_gap(&fallen);
     Ok(Ok(iterate))

@@ -1,7 +1,7 @@
 //! The mesh of a body with all that is tied to its nodes: on the first rank the whole body, on every rank the part that
 //! it needs, with local numbers.
 
-use super::owned::OwnedDofs;
+use super::owned_dofs::OwnedDofs;
 use super::supports::Constraints;
 use crate::exchange::Plain;
 use crate::fem::interpolation::{coarse_nodes, from_vertices};

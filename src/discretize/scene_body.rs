@@ -1,6 +1,6 @@
 //! The bodies of the scene on its mesh: space, elasticity, supports, loads, stiffness. Errors name body and place.
 
-use super::body::BodyMesh;
+use super::body_mesh::BodyMesh;
 use super::groups::{FieldValues, Line, find_group, not_on_body, of_body, point, without_area};
 use super::supports::{Constraints, moment_load, spring_blocks};
 use super::verify::Verified;

@@ -7,7 +7,7 @@ use crate::linalg::axpy;
 use crate::model::body::Energy;
 use crate::model::field::Field;
 use crate::model::layer::Layer;
-use crate::model::rigid;
+use crate::model::motions;
 use crate::model::{BodyCounts, Model};
 use crate::problem::method::StopRule;
 use crate::robin::spectrum::Interval;
@@ -100,7 +100,7 @@ impl Run<'_> {
     /// Complete the row of an iterate u, show it and keep it. `moved` is the step of the traces that led to u (2n),
     /// none for a start. Return the first body with a trace that is not finite.
     pub fn record(&mut self, u: &Field, moved: Option<&[f64]>, row: Row) -> Option<usize> {
-        let mut trace = rigid::trace(self.model, &u.rigid);
+        let mut trace = motions::trace(self.model, &u.rigid);
         axpy(1.0, &u.trace, &mut trace);
         let of = |body: usize| match moved {
             None => f64::NAN,

@@ -14,7 +14,7 @@
 
 use super::approach::mean_normal;
 use super::groups::point;
-use super::whole::NO_WORK;
+use super::whole_body::NO_WORK;
 use crate::contact::ContactPair;
 use crate::error::{Error, Result};
 use crate::fem::cross;

@@ -2,13 +2,13 @@
 //! supports leave, and that by which they move it.
 
 use super::approach;
-use super::bodies::SceneBody;
+use super::scene_body::SceneBody;
 use crate::contact::ContactPair;
 use crate::error::Result;
 use crate::fem::{NodalForces, RigidMotion, rigid};
 use crate::linalg::{Blocks, Csr, PART, TOLERANCE, dot};
 use crate::mesh::Mesh;
-use crate::model::{Motion, Segment, Sprung, rigid::combined};
+use crate::model::{Motion, Segment, Sprung, motions::combined};
 use nalgebra::{DMatrix, DVector};
 use std::collections::HashSet;
 
