@@ -47,7 +47,7 @@ impl Plots {
             by_increment: stop.increment.is_some() && stop.residual.is_none(),
             is_solved: done.outcome.status.is_solved(),
         });
-        for &i in shown.iter().filter(|&&i| pairs.get(i).is_some_and(|pair| pair.along_curve)) {
+        for &i in shown.iter().filter(|&&i| pairs.get(i).is_some_and(|pair| pair.measure.is_along_curve())) {
             let Plot { series, .. } = self.pressures.entry(i).or_insert_with(|| pressure_plot(done, i));
             let pressure = &done.outcome.layer.pressure[done.model().range(i)];
             let curve = curve(label, &pairs[i], Style::Line, |q, _| pressure[q]);

@@ -40,7 +40,7 @@ pub fn pressure(tables: &[ContactTable], discrete: &Discrete) -> Vec<f64> {
 fn neighbours<'a>(pair: &'a ContactPair, table: &ContactTable) -> impl Iterator<Item = Weights> + 'a {
     let scattered = PointTree::new(&table.points);
     // the neighbours on a curve, or around a point of a surface
-    let count = if pair.along_curve { 2 } else { 4 };
+    let count = if pair.measure.is_along_curve() { 2 } else { 4 };
     pair.position.iter().map(move |x| scattered.inverse_distances(x, count))
 }
 

@@ -19,6 +19,6 @@ pub use law::LayerLaw;
 #[cfg(test)]
 pub use law::Response;
 pub use mirror::Mirrors;
-pub use pair::{ContactPair, Coverage, Fault, LostPieces, add, assemble, moment_in_scene};
+pub use pair::{ContactPair, Coverage, Fault, LostPieces, Measure, add, assemble, moment_in_scene};
 pub use review::{Chords, ends};
 pub use side::Side;

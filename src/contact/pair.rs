@@ -10,7 +10,7 @@ use crate::fem::element::{self, Rule};
 use crate::fem::{Frame, Space, area_vector, cross, length, pad};
 use crate::linalg::{Csr, dot};
 use crate::problem::order::Order;
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
@@ -71,10 +71,7 @@ pub struct ContactPair {
     pub moment: [Vec<[f64; 3]>; 2],
     /// Largest angle by which errors of coordinates turn the normals of a side.
     pub uncertainty: f64,
-    /// Whether the points run along curves in their order (plane problems).
-    pub along_curve: bool,
-    /// What `area` measures: `"length"`, or in space and for bodies of revolution `"area"`.
-    #[serde(deserialize_with = "measure")]
+    /// What `area` measures.
     pub measure: Measure,
     /// Law of the layer. It does not go from rank to rank: whoever receives a pair makes its law anew.
     #[serde(skip, default = "no_law")]
@@ -85,12 +82,27 @@ pub struct ContactPair {
     pub lost: Option<LostPieces>,
 }
 
-/// What the areas of contact points are: `"length"` or `"area"`.
-pub type Measure = &'static str;
+/// What the areas of contact points are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Measure {
+    /// Lengths along curves, in the plane.
+    Length,
+    /// Areas of the rings that curves make around the axis of a body of revolution.
+    Ring,
+    /// Areas of surfaces, in space.
+    Area,
+}
 
-/// Return what the areas of a pair from another rank are.
-fn measure<'de, R: Deserializer<'de>>(from: R) -> Result<Measure, R::Error> {
-    String::deserialize(from).map(|name| if name == "length" { "length" } else { "area" })
+impl Measure {
+    /// Return the word for tables: `length` or `area`.
+    pub fn name(self) -> &'static str {
+        if self == Self::Length { "length" } else { "area" }
+    }
+
+    /// Return whether points run along curves in their order.
+    pub fn is_along_curve(self) -> bool {
+        self != Self::Area
+    }
 }
 
 /// Return what stands for the law of a pair from another rank until it is made.
@@ -224,8 +236,11 @@ pub fn assemble<const D: usize>(
         resultant: [Vec::new(), Vec::new()],
         moment: [Vec::new(), Vec::new()],
         uncertainty: a.tilt().max(b.tilt()),
-        along_curve: D == 2,
-        measure: if D == 2 && !a.space.axisymmetric { "length" } else { "area" },
+        measure: match D {
+            2 if a.space.axisymmetric => Measure::Ring,
+            2 => Measure::Length,
+            _ => Measure::Area,
+        },
         law,
         lost: LostPieces::of(a, &cover),
         cover,

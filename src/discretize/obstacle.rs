@@ -15,7 +15,7 @@
 use super::approach::mean_normal;
 use super::groups::point;
 use super::whole_body::NO_WORK;
-use crate::contact::ContactPair;
+use crate::contact::{ContactPair, Measure};
 use crate::error::{Error, Result};
 use crate::fem::cross;
 use crate::linalg::{Csr, dot, length};
@@ -38,7 +38,7 @@ impl<'a> Obstacle<'a> {
     pub fn new(pair: &'a ContactPair, spec: &'a ContactSpec) -> Self {
         let area: f64 = pair.area.iter().sum();
         let middle = |c: usize| pair.area.iter().zip(&pair.position).map(|(w, x)| w * x[c]).sum::<f64>() / area;
-        let is_revolved = pair.along_curve && pair.measure == "area";
+        let is_revolved = pair.measure == Measure::Ring;
         let middle = |c: usize| if is_revolved && c == 0 { 0.0 } else { middle(c) };
         let at = spec.at.map_or_else(|| [0, 1, 2].map(middle), |at| at.0);
         Self { pair, spec, normal: mean_normal(pair).unwrap_or_default(), at }
@@ -72,7 +72,11 @@ impl<'a> Obstacle<'a> {
         let least = (0..3).min_by(|&i, &j| self.normal[i].abs().total_cmp(&self.normal[j].abs())).unwrap_or(0);
         let across = cross(self.normal, std::array::from_fn(|c| f64::from(u8::from(c == least))));
         let first = across.map(|c| c / length(across));
-        let all = if self.pair.along_curve { vec![[0.0, 0.0, 1.0]] } else { vec![first, cross(self.normal, first)] };
+        let all = if self.pair.measure.is_along_curve() {
+            vec![[0.0, 0.0, 1.0]]
+        } else {
+            vec![first, cross(self.normal, first)]
+        };
         let scaled = |axis: [f64; 3]| {
             let most = self.turning(axis).iter().fold(0.0, |most: f64, closing| most.max(closing.abs()));
             axis.map(|c| if most > 0.0 { c / most } else { c })
@@ -133,7 +137,7 @@ impl<'a> Obstacle<'a> {
             .help("name a part of the surface, or let the gap change: gap = \"...\""));
         }
         let moment = spec.moment().unwrap_or_default();
-        if !self.pair.along_curve && self.along(moment).abs() > NO_WORK * length(moment) {
+        if !self.pair.measure.is_along_curve() && self.along(moment).abs() > NO_WORK * length(moment) {
             let message =
                 format!("a moment on the obstacle before `{name}` about its mean normal {}", point(self.normal));
             return Err(Error::scene(place, message).help("no pressure resists it: take that part out"));
