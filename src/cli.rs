@@ -2,6 +2,7 @@
 
 use crate::commands::{bench, check, mesh, new, solve, sweep};
 use crate::error::{Error, Kind, Result};
+use crate::file;
 use crate::interrupt::Interrupt;
 use crate::output::say;
 use crate::petsc::Session;
@@ -224,12 +225,23 @@ fn without_session(interrupt: &Interrupt, command: Command, petsc: Vec<String>) 
     ended.unwrap_or_else(|error| complain(&error))
 }
 
+/// Refuse a folder, a pipe or a device as a file of options: PETSc would wait for ever at a pipe.
+fn refuse_odd_files(words: &[String]) -> Result<()> {
+    for pair in words.windows(2).filter(|pair| pair[0].eq_ignore_ascii_case("-options_file")) {
+        // PETSc itself reports a file that does not exist.
+        if Path::new(&pair[1]).exists() {
+            file::open(Path::new(&pair[1]))?;
+        }
+    }
+    Ok(())
+}
+
 /// Run a command that solves, in a session with PETSc. `check` starts MPI and PETSc only if something needs them.
 fn with_session(petsc: &[String], interrupt: &Interrupt, command: Solving) -> i32 {
     let is_lone = petsc.is_empty() && std::env::var_os("PETSC_OPTIONS").is_none() && !Session::is_one_of_several();
     let session = match command {
-        Solving::Check(_) if is_lone => Session::alone(),
-        _ => Session::start(petsc),
+        Solving::Check(_) if is_lone => Session::alone().map_err(Error::from),
+        _ => refuse_odd_files(petsc).and_then(|()| Ok(Session::start(petsc)?)),
     };
     let session = match session {
         Ok(session) => session,
@@ -237,7 +249,7 @@ fn with_session(petsc: &[String], interrupt: &Interrupt, command: Solving) -> i3
     };
     match dispatch(&session, interrupt, command) {
         Ok(code) => match session.finish() {
-            Err(error) if code == 0 => complain(&error),
+            Err(error) if code == 0 => complain(&error.into()),
             _ => code,
         },
         Err(error) if error.is_silent() => error.kind().exit_code(),

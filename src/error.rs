@@ -3,6 +3,7 @@
 //! Modules return errors as data; `cli` prints them, once (see [`Error::render`]). Not converging is not an error but a
 //! [`Status`](crate::ddm::Status) of a run.
 
+use crate::petsc;
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use std::fmt;
 use std::ops::{Deref, Range};
@@ -328,6 +329,16 @@ impl fmt::Debug for Error {
 }
 
 impl std::error::Error for Error {}
+
+/// An error of the solver library.
+impl From<petsc::Error> for Error {
+    fn from(error: petsc::Error) -> Self {
+        let petsc::Error { message, causes, help } = error;
+        let mut all = Self::new(Kind::Solver, message);
+        (all.0.causes, all.0.help) = (causes, help);
+        all
+    }
+}
 
 /// Format a number as people write it: numbers far from one have an exponent, not three hundred digits.
 pub fn shown(value: f64) -> String {

@@ -33,6 +33,11 @@ pub mod model {
     pub use crate::model::{Field, Model, field};
 }
 
+pub mod parallel {
+    //! Ranks.
+    pub use crate::parallel::launcher;
+}
+
 pub mod run {
     //! A run in stages.
     pub use crate::run::{build, iterate, report, results, set_up, stages};

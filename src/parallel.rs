@@ -7,6 +7,8 @@ use mpi::collective::SystemOperation;
 use mpi::datatype::PartitionMut;
 use mpi::traits::{Communicator, CommunicatorCollectives, Destination, Root, Source};
 use std::cell::Cell;
+use std::env;
+use std::process::Command;
 
 /// The ranks of a run.
 pub struct Ranks {
@@ -137,6 +139,19 @@ pub fn collectively<T>(session: &Session, result: Result<T>) -> Result<T> {
         Err(error) if mine == least => Err(error.agreed()),
         _ => Err(Error::silent(least as u32 as i32)),
     }
+}
+
+/// Return the command that starts ranks of a program: the words of `$WINKLER_MPIEXEC`, or else `mpiexec`. Arguments to
+/// add are `-n`, the number of ranks, and the program. Open MPI gets the permission to start more ranks than there are
+/// cores.
+pub fn launcher() -> Command {
+    let typed = env::var("WINKLER_MPIEXEC").unwrap_or_default();
+    let mut words = typed.split_whitespace();
+    let mut command = Command::new(words.next().unwrap_or("mpiexec"));
+    command.args(words);
+    command.env("OMPI_MCA_rmaps_base_oversubscribe", "1"); // Open MPI 4
+    command.env("PRTE_MCA_rmaps_default_mapping_policy", ":oversubscribe"); // Open MPI 5
+    command
 }
 
 #[cfg(test)]

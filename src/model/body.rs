@@ -401,7 +401,7 @@ impl Interior {
 
     /// See [`Body::recover`].
     fn recover(&self, u: &[f64]) -> Result<Vec<f64>> {
-        let turned = self.with_factor(|schur| schur.expand(&self.load, u))?;
+        let turned = self.with_factor(|schur| Ok(schur.expand(&self.load, u)?))?;
         Ok(self.interface.turn_back(&turned))
     }
 

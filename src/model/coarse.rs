@@ -5,7 +5,7 @@ use super::{BodySlot, Model, Motion, Segment};
 use crate::error::Result;
 use crate::exchange::Exchange;
 use crate::linalg::{Csr, Factor, axpy, dot};
-use crate::petsc::Subspace;
+use crate::petsc::{self, Subspace};
 use crate::solver::MakeSubspace;
 use nalgebra::DVector;
 use std::rc::Rc;
@@ -104,7 +104,7 @@ struct WithSprings {
 
 impl Subspace for WithSprings {
     /// Add Z y to a solution z of H z = r, with Z'HZ y = Z'(r - H z).
-    fn correct(&self, r: &[f64], z: &mut [f64]) -> Result<()> {
+    fn correct(&self, r: &[f64], z: &mut [f64]) -> Result<(), petsc::Error> {
         let space = &self.space;
         // this rank has one term of B z, and of its work
         let mut force = vec![0.0; space.rows.rows()];

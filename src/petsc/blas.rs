@@ -3,8 +3,8 @@
 //! Factorisations with the reference BLAS are up to 11 times slower, so a run reports the name. Only OpenBLAS has
 //! functions with `openblas_`, which are looked up by name.
 
+use super::error::{Error, Result};
 use super::ffi::{dpotrf_, dpotrs_};
-use crate::error::{Error, Kind, Result};
 use std::ffi::{CStr, c_char, c_int, c_void};
 
 /// The triangle that holds the factor.
@@ -14,7 +14,7 @@ const UPPER: &CStr = c"U";
 fn order(matrix: &[f64], n: usize) -> Result<c_int> {
     match c_int::try_from(n) {
         Ok(order) if matrix.len() == n * n => Ok(order),
-        _ => Err(Error::new(Kind::Solver, format!("{} numbers are not a dense matrix of {n} rows", matrix.len()))),
+        _ => Err(Error::new(format!("{} numbers are not a dense matrix of {n} rows", matrix.len()))),
     }
 }
 
@@ -51,7 +51,7 @@ pub fn cholesky(matrix: &mut [f64], n: usize) -> Result<bool> {
 pub fn cholesky_solve(factor: &[f64], n: usize, x: &mut [f64]) -> Result<()> {
     let (rows, lead, mut info) = (order(factor, n)?, order(factor, n)?.max(1), 0);
     if x.len() != n {
-        return Err(Error::new(Kind::Solver, format!("{} numbers are no right-hand side of {n} rows", x.len())));
+        return Err(Error::new(format!("{} numbers are no right-hand side of {n} rows", x.len())));
     }
     // SAFETY: a factor of n x n numbers and one right-hand side of n.
     unsafe { dpotrs_(UPPER.as_ptr(), &rows, &1, factor.as_ptr(), &lead, x.as_mut_ptr(), &lead, &mut info, 1) };

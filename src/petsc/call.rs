@@ -7,10 +7,10 @@
 //! has [`MumpsInt`](super::ffi::MumpsInt) and METIS [`idx_t`](super::ffi::idx_t). Patterns of this program have 32
 //! bits.
 
+use super::error::{Error, Result};
 use super::ffi;
 use super::ffi::PetscBool;
 use super::launch::with_quick_start;
-use crate::error::{Error, Kind, Result};
 use std::cell::{Cell, RefCell};
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::ptr::{null, null_mut};
@@ -116,7 +116,7 @@ fn check_code(function: &str, call: impl FnOnce() -> ffi::PetscErrorCode) -> Res
 /// Return the error of a failed call.
 fn failure(function: &str, code: ffi::PetscErrorCode) -> Error {
     let trace = TRACE.take();
-    let mut error = Error::new(Kind::Solver, format!("PETSc failed in {function}"));
+    let mut error = Error::new(format!("PETSc failed in {function}"));
     let kind = meaning(code);
     error = match (trace.message.is_empty(), kind) {
         (false, Some(kind)) => error.because(format!("{} ({kind})", trace.message)),
@@ -196,7 +196,7 @@ unsafe extern "C" fn record(
 
 /// Return a text that ends with a zero byte, as C expects it.
 pub(super) fn text(text: &str) -> Result<CString> {
-    CString::new(text).map_err(|_| Error::new(Kind::Solver, format!("a zero byte in a PETSc option: {text:?}")))
+    CString::new(text).map_err(|_| Error::new(format!("a zero byte in a PETSc option: {text:?}")))
 }
 
 /// Return a count as an integer of a `library`; the message names what is counted.
@@ -208,11 +208,8 @@ pub(super) fn text(text: &str) -> Result<CString> {
 pub(super) fn fit<T: TryFrom<usize>>(library: &str, what: &str, count: usize) -> Result<T> {
     T::try_from(count).map_err(|_| {
         let bits = 8 * size_of::<T>();
-        Error::new(
-            Kind::Solver,
-            format!("{count} {what} do not fit into the integers of {library}, which have {bits} bits"),
-        )
-        .help("take a coarser mesh, or more ranks")
+        Error::new(format!("{count} {what} do not fit into the integers of {library}, which have {bits} bits"))
+            .help("take a coarser mesh, or more ranks")
     })
 }
 
@@ -236,6 +233,6 @@ mod tests {
         assert_eq!(fit::<i32>("MUMPS", "dofs", i32::MAX as usize).expect("it fits"), i32::MAX);
         assert_eq!(fit::<i64>("PETSc", "dofs", 1 << 31).expect("it fits"), 1 << 31);
         let error = fit::<i32>("MUMPS", "dofs", 1 << 31).expect_err("it does not fit");
-        assert!(error.message().contains("2147483648 dofs do not fit into the integers of MUMPS, which have 32 bits"));
+        assert!(error.message.contains("2147483648 dofs do not fit into the integers of MUMPS, which have 32 bits"));
     }
 }

@@ -2,11 +2,11 @@
 //! solve stopped, and how a solver recovers from a factorisation that failed.
 
 use super::call::{flag, is_set, petsc, string, text, text_from};
+use super::error::{Error, Result};
 use super::mumps::EXTRA_SPACE;
 use super::subspace::{Started, Subspace, Wrapper};
 use super::vector::Vector;
 use super::{Int, Matrix, Scope, Session, ffi};
-use crate::error::{Error, Kind, Result};
 use std::cell::Cell;
 use std::ffi::CStr;
 use std::fmt;
@@ -129,7 +129,7 @@ impl Ksp {
     /// When the solver had a matrix of another size, or belongs to other processes.
     pub fn set_operator(&mut self, matrix: &Matrix) -> Result<()> {
         if matrix.scope() != self.scope {
-            return Err(Error::new(Kind::Solver, "a matrix and its solver belong to different processes"));
+            return Err(Error::new("a matrix and its solver belong to different processes"));
         }
         // SAFETY: the solver takes references to the matrix.
         unsafe { petsc!(KSPSetOperators(self.ksp, matrix.raw(), matrix.raw())) }?;
@@ -167,7 +167,7 @@ impl Ksp {
 
     /// Return the refusal of an option that limits the number of iterations to none.
     pub(crate) fn idle(option: &str, limit: impl fmt::Display) -> Error {
-        Error::new(Kind::Solver, format!("{option} is {limit}: the solver would do nothing"))
+        Error::new(format!("{option} is {limit}: the solver would do nothing"))
             .help("give 1 or more; `-ksp_type preonly` applies the preconditioner once")
     }
 
@@ -232,7 +232,7 @@ impl Ksp {
     /// When a slice does not have one entry for each row, or no matrix was set.
     pub fn solve(&self, b: &[f64], x: &mut [f64]) -> Result<Solved> {
         let Some([right, left]) = &self.vectors else {
-            return Err(Error::new(Kind::Solver, "a linear solver was called before it had a matrix"));
+            return Err(Error::new("a linear solver was called before it had a matrix"));
         };
         let mut guess = flag(false);
         // SAFETY: the solver of this wrapper.
@@ -269,7 +269,7 @@ impl Ksp {
     /// When a slice does not have one entry for each row, or no matrix was set.
     pub fn precondition(&self, r: &[f64], z: &mut [f64]) -> Result<()> {
         let Some([right, left]) = &self.vectors else {
-            return Err(Error::new(Kind::Solver, "a preconditioner was applied before it had a matrix"));
+            return Err(Error::new("a preconditioner was applied before it had a matrix"));
         };
         self.set_up()?;
         let pc = self.outermost_pc()?;
@@ -321,7 +321,7 @@ impl Ksp {
     pub fn set_reuse_preconditioner(&self, reuse: bool) -> Result<()> {
         if reuse && self.applies_only() {
             let name = self.ksp_type();
-            return Err(Error::new(Kind::Solver, format!("`{name}` cannot keep the factorisation of an older matrix"))
+            return Err(Error::new(format!("`{name}` cannot keep the factorisation of an older matrix"))
                 .because("it applies it once and would return the solution of the older system")
                 .help(format!("take an iterative method, e.g. `{}ksp_type cg`", self.own_options())));
         }

@@ -4,8 +4,8 @@
 //! eigenvalues each time. Its QL iteration does not end where rounding makes a number that is none.
 
 use super::call::petsc;
+use super::error::Result;
 use super::ffi;
-use crate::error::Result;
 use std::ptr::null_mut;
 
 /// Conjugate gradients that are followed from iterate to iterate.

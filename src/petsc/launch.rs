@@ -1,7 +1,6 @@
-//! How processes of MPI are started: by a launcher, or alone.
+//! How a process starts MPI: under a launcher, or alone.
 
 use std::env;
-use std::process::Command;
 
 /// Return whether a launcher such as `mpiexec` or `srun` started this process, by the variables of Open MPI, PMIx and
 /// PMI.
@@ -41,17 +40,4 @@ pub(super) fn with_quick_start<T>(start: impl FnOnce() -> T) -> T {
         unsafe { env::remove_var(name) };
     }
     result
-}
-
-/// Return the command that starts ranks of a program: the words of `$WINKLER_MPIEXEC`, or else `mpiexec`. Arguments to
-/// add are `-n`, the number of ranks, and the program. Open MPI gets the permission to start more ranks than there are
-/// cores.
-pub fn launcher() -> Command {
-    let typed = env::var("WINKLER_MPIEXEC").unwrap_or_default();
-    let mut words = typed.split_whitespace();
-    let mut command = Command::new(words.next().unwrap_or("mpiexec"));
-    command.args(words);
-    command.env("OMPI_MCA_rmaps_base_oversubscribe", "1"); // Open MPI 4
-    command.env("PRTE_MCA_rmaps_default_mapping_policy", ":oversubscribe"); // Open MPI 5
-    command
 }

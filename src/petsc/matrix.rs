@@ -1,9 +1,9 @@
 //! Sparse matrices (MATAIJ), the rows that they are made of, and their index sets (IS) and submatrices.
 
 use super::call::{fit, flag, petsc};
+use super::error::{Error, Result};
 use super::vector::{Vector, check_length};
 use super::{Int, Scope, Session, ffi};
-use crate::error::{Error, Kind, Result};
 use mpi::ffi::{MPI_Comm, RSMPI_COMM_SELF};
 use std::ffi::c_void;
 use std::ops::Range;
@@ -66,7 +66,7 @@ impl Matrix {
         let (scope, own, total, nonzeros) = (rows.scope, rows.own(), rows.total, rows.values.len());
         let count = own.len();
         if block_size == 0 || count % block_size != 0 {
-            return Err(Error::new(Kind::Solver, format!("blocks of {block_size} do not divide {count} rows")));
+            return Err(Error::new(format!("blocks of {block_size} do not divide {count} rows")));
         }
         let header = || Vector::new(session, scope, count, block_size);
         let (x, y, session) = (header()?, header()?, session.clone());
@@ -388,7 +388,7 @@ impl Rows {
         check(&row_ptr, &columns, &values, total)?;
         let own = first..first + row_ptr.len() - 1;
         if own.end > total {
-            return Err(Error::new(Kind::Solver, format!("a process has the rows {own:?} of {total}")));
+            return Err(Error::new(format!("a process has the rows {own:?} of {total}")));
         }
         let (mut other_row_ptr, mut other_columns, mut others) = (vec![0], Vec::new(), Vec::new());
         let (mut next, mut begin) = (0, 0);
@@ -473,7 +473,7 @@ unsafe fn attach(mat: ffi::Mat, rows: *mut Rows) -> Result<()> {
 
 /// Check that arrays are compressed rows with sorted columns below `width`.
 pub(super) fn check(row_ptr: &[Int], columns: &[Int], values: &[f64], width: usize) -> Result<()> {
-    let wrong = |what: &str| Err(Error::new(Kind::Solver, format!("not a sparse matrix in compressed rows: {what}")));
+    let wrong = |what: &str| Err(Error::new(format!("not a sparse matrix in compressed rows: {what}")));
     fit::<Int>("PETSc", "columns", width)?;
     let Some(&last) = row_ptr.last() else {
         return wrong("row_ptr is empty");
@@ -573,7 +573,7 @@ mod tests {
         ];
         for (row_ptr, columns, words) in cases {
             let error = Rows::all(row_ptr.to_vec(), columns.to_vec(), vec![1.0; columns.len()]).expect_err(words);
-            assert!(error.message().contains(words), "{error}");
+            assert!(error.message.contains(words), "{error}");
         }
         assert!(Rows::all(vec![0, 1, 2], vec![0, 1], vec![1.0, 1.0]).is_ok());
         assert!(Rows::of_process(2, 2, vec![0, 0], Vec::new(), Vec::new()).is_err());

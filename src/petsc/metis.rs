@@ -1,8 +1,8 @@
 //! Nested dissection of graphs by METIS.
 
 use super::call::fit;
+use super::error::{Error, Result};
 use super::ffi::{METIS_NodeND, idx_t};
-use crate::error::{Error, Kind, Result};
 use std::ptr::null_mut;
 
 /// A symmetric graph: the neighbours of node `i` are `col[ptr[i]..ptr[i + 1]]`, without `i` itself.
@@ -38,7 +38,7 @@ pub fn nested_dissection(graph: Graph) -> Result<Vec<i32>> {
         slot.is_some_and(|seen| !std::mem::replace(seen, true))
     };
     if code != 1 || !position.iter().all(is_new) {
-        return Err(Error::new(Kind::Solver, "METIS returned no elimination order")
+        return Err(Error::new("METIS returned no elimination order")
             .because(format!("METIS_NodeND returned {code}"))
             .help("take another solver: --set solver=mumps"));
     }

@@ -1,7 +1,7 @@
 //! A safe binding of the part of PETSc that solves linear systems, useful alone.
 //!
 //! Objects hold a counted token of the [`Session`] and have no lifetimes. PETSc ends with the last token. Objects are
-//! neither `Send` nor `Sync`. Every call is checked, and PETSc's own message is in the [`Error`](crate::error::Error).
+//! neither `Send` nor `Sync`. Every call is checked, and PETSc's own message is in the [`Error`].
 //! PETSc itself prints only what options request (`-ksp_monitor`, `-ksp_view`, `-log_view`, `-help`, ...). Where a
 //! function says nothing else, its errors are PETSc's and those of MUMPS.
 //!
@@ -26,6 +26,7 @@
 
 mod blas;
 mod call;
+mod error;
 mod ffi;
 mod ksp;
 mod lanczos;
@@ -42,9 +43,9 @@ mod until;
 mod vector;
 
 pub use blas::{cholesky, cholesky_solve};
+pub use error::Error;
 pub use ffi::Int;
 pub use ksp::{ConvergedReason, Ksp, Solved};
-pub use launch::launcher;
 pub use matrix::{Matrix, Rows};
 pub use metis::{Graph, nested_dissection};
 pub use mumps::Schur;

@@ -4,9 +4,9 @@
 
 use super::Session;
 use super::call::{ensure_running, fit};
+use super::error::{Error, Result};
 use super::ffi::{DMUMPS_STRUC_C, MumpsInt, dmumps_c};
 use super::metis::{self, Graph};
-use crate::error::{Error, Kind, Result};
 use mpi::ffi::{RSMPI_COMM_SELF, RSMPI_Comm_c2f};
 use std::ptr::null_mut;
 
@@ -97,7 +97,7 @@ impl Schur {
         let one = |i: usize| i as MumpsInt + 1;
         let inside = lower.iter().all(|&(i, j, _)| i < rows && j <= i) && interface.iter().all(|&i| i < rows);
         if !inside || interface.len() >= rows || !rows.is_multiple_of(block_size) {
-            return Err(Error::new(Kind::Solver, "not a lower triangle with interior rows"));
+            return Err(Error::new("not a lower triangle with interior rows"));
         }
         fit::<MumpsInt>("MUMPS", "dofs", rows + 1)?;
         // MUMPS needs MPI
@@ -229,7 +229,7 @@ impl Schur {
     fn solve(&mut self, phase: MumpsInt, b: &mut [f64], reduced: &mut [f64]) -> Result<()> {
         let mumps = &mut *self.mumps;
         if b.len() != mumps.n as usize || reduced.len() != self.interface.len() {
-            return Err(Error::new(Kind::Solver, "a right-hand side of the wrong length for a Schur complement"));
+            return Err(Error::new("a right-hand side of the wrong length for a Schur complement"));
         }
         (mumps.rhs, mumps.nrhs, mumps.lrhs) = (b.as_mut_ptr(), 1, mumps.n);
         (mumps.redrhs, mumps.lredrhs) = (reduced.as_mut_ptr(), reduced.len() as MumpsInt);
@@ -255,7 +255,7 @@ impl Schur {
     /// Set a control by the name of its option.
     fn control(&mut self, name: &str, value: &str) -> Result<()> {
         let refuse = |cause: String| {
-            Error::new(Kind::Solver, format!("-{name} {value} cannot be used with the condensed solver"))
+            Error::new(format!("-{name} {value} cannot be used with the condensed solver"))
                 .because(cause)
                 .help("leave it out, or choose -ksp_type and -pc_type for a solver of PETSc")
         };
@@ -359,7 +359,7 @@ fn failure(job: MumpsInt, first: MumpsInt, second: MumpsInt) -> Error {
     };
     // sizes below zero are in millions
     let size = if second < 0 { format!("{} million", -i64::from(second)) } else { second.to_string() };
-    let error = Error::new(Kind::Solver, format!("MUMPS failed in its {phase} (INFOG(1)={first}, INFOG(2)={second})"));
+    let error = Error::new(format!("MUMPS failed in its {phase} (INFOG(1)={first}, INFOG(2)={second})"));
     match first {
         -5 | -7 | -13 | -19 => error
             .because(format!("it could not get memory for {size} numbers"))
@@ -387,8 +387,8 @@ mod tests {
             (-53, 0, "users' guide"),
         ] {
             let error = failure(2, first, second);
-            assert!(error.message().contains(&format!("INFOG(1)={first}")), "{error}");
-            assert!(error.render(false).contains(words), "{}", error.render(false));
+            assert!(error.message.contains(&format!("INFOG(1)={first}")), "{error}");
+            assert!(error.to_string().contains(words), "{error}");
         }
     }
 }

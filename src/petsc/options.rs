@@ -2,8 +2,8 @@
 
 use super::Session;
 use super::call::{self, flag, is_set, petsc, string, text};
+use super::error::{Error, Result};
 use super::session::{Entry, left};
-use crate::error::{Error, Kind, Result};
 use std::ffi::CString;
 use std::ptr::{null, null_mut};
 
@@ -115,7 +115,7 @@ fn key(name: &str) -> Result<CString> {
     let name = dashed(name);
     let is_valid = name.trim_start_matches('-').starts_with(char::is_alphabetic) && !name.contains(char::is_whitespace);
     if !is_valid {
-        return Err(Error::new(Kind::Solver, format!("`{name}` is not the name of a PETSc option")));
+        return Err(Error::new(format!("`{name}` is not the name of a PETSc option")));
     }
     text(&name)
 }

@@ -11,11 +11,11 @@
 //! these columns.
 
 use super::call::{flag, petsc};
+use super::error::Result;
 use super::matrix::Indices;
 use super::subspace::Subspace;
 use super::vector::Vector;
 use super::{Ksp, Matrix, ffi};
-use crate::error::Result;
 
 /// The space of the dofs P, with the columns P of A and the factor of P'AP.
 struct PatchSpace {

@@ -1,10 +1,10 @@
 //! Multigrid of two levels (PCMG), whose interpolation the program makes.
 
 use super::call::{flag, petsc};
+use super::error::{Error, Result};
 use super::matrix::check;
 use super::vector::DETERMINE;
 use super::{Int, Ksp, Matrix, Scope, ffi};
-use crate::error::{Error, Kind, Result};
 use mpi::collective::SystemOperation;
 use mpi::traits::CommunicatorCollectives;
 use std::ptr::null_mut;
@@ -51,7 +51,7 @@ impl Ksp {
         check(row_ptr, columns, values, width)?;
         if row_ptr.len() != rows + 1 {
             let message = format!("an interpolation of {} rows for a matrix of {rows}", row_ptr.len() - 1);
-            return Err(Error::new(Kind::Solver, message));
+            return Err(Error::new(message));
         }
         let (i, j, v) = (row_ptr.as_ptr(), columns.as_ptr(), values.as_ptr());
         let (comm, mut mat, pc) = (matrix.scope().comm(matrix.session()), null_mut(), self.pc()?);

@@ -2,16 +2,14 @@
 
 use super::blas;
 use super::call::{self, petsc, string, text};
+use super::error::{Error, Result};
 use super::launch::{is_launched, with_quick_start};
-use crate::error::{Error, Kind, Result};
-use crate::file;
 use mpi::environment::Universe;
 use mpi::topology::{Communicator, SimpleCommunicator};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::env;
 use std::io::Write;
-use std::path::Path;
 use std::ptr::null_mut;
 use std::rc::Rc;
 use std::sync::Once;
@@ -56,13 +54,12 @@ impl Session {
     /// one of them ends all.
     ///
     /// # Errors
-    /// `Kind::Solver` when a session was started before in this process, when MPI runs already, or when PETSc refuses
-    /// an option; PETSc's message is among the causes. `Kind::File` when `-options_file` names no regular file.
+    /// When a session was started before in this process, when MPI runs already, or when PETSc refuses an option;
+    /// PETSc's message is among the causes. PETSc waits for ever if `-options_file` names a pipe.
     pub fn start(words: &[String]) -> Result<Session> {
-        refuse_odd_files(words)?;
         start_once()?;
         let universe = with_quick_start(mpi::initialize)
-            .ok_or_else(|| Error::new(Kind::Solver, "MPI was already started in this process by other code"))?;
+            .ok_or_else(|| Error::new("MPI was already started in this process by other code"))?;
         let world = SimpleCommunicator::world();
         abort_on_panic(world.size() > 1);
         let session =
@@ -204,22 +201,10 @@ pub(super) fn left() -> Result<Vec<Entry>> {
     Ok(entries)
 }
 
-/// Refuse a folder, a pipe or a device as a file of options: PETSc would wait for ever at a pipe.
-fn refuse_odd_files(words: &[String]) -> Result<()> {
-    for pair in words.windows(2).filter(|pair| pair[0].eq_ignore_ascii_case("-options_file")) {
-        // PETSc itself reports a file that does not exist.
-        if Path::new(&pair[1]).exists() {
-            file::open(Path::new(&pair[1]))?;
-        }
-    }
-    Ok(())
-}
-
 /// Note the start of a session.
 fn start_once() -> Result<()> {
     if STARTED.swap(true, Ordering::SeqCst) {
-        return Err(Error::new(Kind::Solver, "PETSc was already started in this process")
-            .help("start one session and clone it"));
+        return Err(Error::new("PETSc was already started in this process").help("start one session and clone it"));
     }
     Ok(())
 }

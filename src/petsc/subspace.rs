@@ -2,9 +2,9 @@
 //! preconditioner of a solver.
 
 use super::call::petsc;
+use super::error::{Error, Result};
 use super::vector::{Vector, slice, slice_mut};
 use super::{Matrix, ffi};
-use crate::error::{Error, Result};
 use std::cell::{Cell, RefCell};
 use std::ffi::{CStr, c_void};
 use std::ptr::{null, null_mut};

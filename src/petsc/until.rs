@@ -1,12 +1,12 @@
 //! A linear solve with a stopping test of the caller.
 
 use super::call::petsc;
+use super::error::Result;
 use super::ksp::Solved;
 use super::lanczos::Lanczos;
 use super::subspace::ERROR;
 use super::vector::slice;
 use super::{Ksp, ffi};
-use crate::error::Result;
 use std::ffi::c_void;
 use std::ptr::{null, null_mut};
 

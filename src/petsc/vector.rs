@@ -1,8 +1,8 @@
 //! Vectors: headers of PETSc, made once, over slices of Rust. The scope of an object is one process or all.
 
 use super::call::petsc;
+use super::error::{Error, Result};
 use super::{Int, Session, ffi};
-use crate::error::{Error, Kind, Result};
 use mpi::collective::SystemOperation;
 use mpi::ffi::{MPI_Comm, RSMPI_COMM_SELF};
 use mpi::raw::AsRaw;
@@ -130,7 +130,7 @@ pub(super) fn check_length(what: &str, length: usize, rows: usize) -> Result<()>
     if length == rows {
         return Ok(());
     }
-    Err(Error::new(Kind::Solver, format!("{what} has {length} entries for a matrix of {rows} rows")))
+    Err(Error::new(format!("{what} has {length} entries for a matrix of {rows} rows")))
 }
 
 /// The processes that own an object together. Calls on an object of all processes are collective.

@@ -90,7 +90,7 @@ impl Krylov {
             ksp.set_interpolation(&matrix, [&super::integers(ptr), &super::integers(col)], &values, own)?;
         }
         chosen.refuse_idle()?;
-        ksp.set_from_options().map_err(|error| chosen.explain(error))?;
+        ksp.set_from_options().map_err(|error| chosen.explain(error.into()))?;
         if ksp.pc_type() == "gamg" && !near_null_space.is_empty() {
             matrix.set_near_null_space(near_null_space)?;
         }
@@ -228,14 +228,14 @@ impl InnerSolver for Krylov {
                 self.stale = false;
                 self.fresh = None;
             }
-            self.ksp.set_up().map_err(|error| self.chosen.explain(error))?;
+            self.ksp.set_up().map_err(|error| self.chosen.explain(error.into()))?;
         }
         Ok(())
     }
 
     fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<SolveOutcome> {
         self.reached = self.ksp.tolerance();
-        let solved = self.staged(|ksp| ksp.solve(r, z))?;
+        let solved = self.staged(|ksp| Ok(ksp.solve(r, z)?))?;
         self.judge(&solved);
         Ok(solved)
     }
@@ -247,10 +247,10 @@ impl InnerSolver for Krylov {
         self.ksp.set_tolerance(f64::EPSILON)?;
         let mut reached = 1.0;
         let solved = self.staged(|ksp| {
-            ksp.solve_until(r, z, &mut |iterate| {
+            Ok(ksp.solve_until(r, z, &mut |iterate| {
                 reached = iterate.residual / iterate.first;
                 enough(iterate)
-            })
+            })?)
         })?;
         self.reached = reached;
         self.judge(&solved);
@@ -258,7 +258,10 @@ impl InnerSolver for Krylov {
     }
 
     fn set_tolerance(&mut self, rtol: f64) -> Result<()> {
-        if self.free { self.ksp.set_tolerance(rtol) } else { Ok(()) }
+        if self.free {
+            self.ksp.set_tolerance(rtol)?;
+        }
+        Ok(())
     }
 
     fn accuracy(&self) -> f64 {

@@ -29,10 +29,11 @@ use serde::{Deserialize, Serialize};
 /// Turn a whole matrix into PETSc's rows, or the rows of this rank, which begin with number `start`.
 pub fn rows_of(matrix: Csr, start: Option<usize>) -> Result<Rows> {
     let Csr { columns, ptr, col, values } = matrix;
-    match start {
+    let rows = match start {
         None => Rows::all(integers(ptr), integers(col), values),
         Some(start) => Rows::of_process(start, columns, integers(ptr), integers(col), values),
-    }
+    };
+    Ok(rows?)
 }
 
 /// Convert an array of a pattern to PETSc's integers. Where these have 32 bits, the array is not copied.

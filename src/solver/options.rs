@@ -197,7 +197,7 @@ impl Chosen {
         let is_idle =
             |(name, value): &(&str, &str)| is_limit(name) && value.parse::<i64>().is_ok_and(|limit| limit < 1);
         let idle = self.all_typed().find(is_idle);
-        idle.map_or(Ok(()), |(name, value)| Err(Ksp::idle(&format!("-{}_{name}", self.prefix), value)))
+        idle.map_or(Ok(()), |(name, value)| Err(Ksp::idle(&format!("-{}_{name}", self.prefix), value).into()))
     }
 
     /// Name the option of an unknown type of KSP or PC, if that is why PETSc refused a solver, or return PETSc's error.
@@ -405,7 +405,7 @@ pub fn show_help(session: &Session) -> Result<()> {
     let mut ksp = Ksp::new(session, "")?;
     ksp.set_operator(&matrix)?;
     ksp.set_from_options()?;
-    ksp.set_up()
+    Ok(ksp.set_up()?)
 }
 
 #[cfg(test)]

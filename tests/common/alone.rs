@@ -3,7 +3,7 @@
 use std::process::{Command, Output};
 use std::time::Duration;
 use winkler::error::Result;
-use winkler::petsc::launcher;
+use winkler::internals::parallel::launcher;
 
 /// The time after which ranks that wait for each other are ended.
 pub const TIMEOUT: Duration = Duration::from_secs(60);

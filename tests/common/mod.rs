@@ -15,7 +15,7 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::RwLock;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
-use winkler::petsc::launcher;
+use winkler::internals::parallel::launcher;
 
 /// The program under test.
 pub const WINKLER: &str = env!("CARGO_BIN_EXE_winkler");

@@ -6,12 +6,12 @@ use std::fs;
 use std::path::Path;
 
 /// The modules from the ground up; each may use those below it.
-const MODULES: &str = "error exchange file interrupt linalg petsc data expression problem mesh fem contact parallel \
+const MODULES: &str = "petsc error exchange file interrupt linalg data expression problem mesh fem contact parallel \
     solver model robin ddm output report scene discretize estimate run api commands internals cli main";
 
 /// Modules that may use less than what lies below them.
 const NARROW: [(&str, &str); 7] = [
-    ("petsc", "error file"),
+    ("petsc", ""),
     ("solver", "error exchange linalg petsc problem fem parallel"),
     ("model", "error exchange file linalg petsc fem contact solver"),
     ("robin", "error exchange linalg contact problem model"),

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
-use winkler::petsc::launcher;
+use winkler::internals::parallel::launcher;
 
 /// A run that would take hours: the paper's iteration with tiny steps.
 const ENDLESS: [&str; 4] = ["--set", "method.gamma=1e-6", "--set", "method.stop={residual=1e-12,iterations=100000000}"];

@@ -9,7 +9,7 @@ use crate::interrupt::{self, Interrupt};
 use crate::linalg::range;
 use crate::output::folder::{MARK, REPORT, is_made, refuse_link};
 use crate::output::{Folder, refuse_foreign, safe_name, write_whole};
-use crate::petsc::launcher;
+use crate::parallel::launcher;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use serde_json::Value;
