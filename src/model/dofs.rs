@@ -210,6 +210,21 @@ impl Distribution {
     }
 }
 
+/// Return as many dofs as there are motions, such that no combination of the motions leaves all these dofs at rest.
+/// They are the pivots of an elimination.
+pub(super) fn pins(motions: &[Vec<f64>]) -> Vec<usize> {
+    let mut remaining = motions.to_vec();
+    let mut pins = Vec::new();
+    while let Some(mut motion) = remaining.pop() {
+        let Some(pin) = (0..motion.len()).max_by(|&i, &j| motion[i].abs().total_cmp(&motion[j].abs())) else { break };
+        let pivot = motion[pin];
+        motion.iter_mut().for_each(|u| *u /= pivot);
+        remaining.iter_mut().for_each(|other| axpy(-other[pin], &motion, other));
+        pins.push(pin);
+    }
+    pins
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -7,13 +7,14 @@
 //! do, every rank has the whole matrix and solves for itself.
 
 use super::coarse::RigidSpace;
+use super::dofs::pins;
 use super::field::add_forces;
 use super::linear::{Failure, LinearSolution, LinearStep, Solved, StoppingTest, System, Trial};
 use super::rigid_parts::{ACCURACY, RigidParts, WithoutRigidParts};
 use super::{BodySlot, Distribution, Dofs, Field, Model, closing};
 use crate::error::{Error, Kind, Result};
 use crate::exchange::all_gather;
-use crate::linalg::{Csr, axpy, countable, dot};
+use crate::linalg::{Csr, countable, dot};
 use crate::petsc::KspIterate;
 use crate::solver::{BodyCounts, MakeSolver, SpringMatrix, rows_of};
 use serde::{Deserialize, Serialize};
@@ -529,19 +530,4 @@ fn push_merged(matrix: &mut Csr, known: impl Iterator<Item = (i32, f64)>, column
     }
     known.for_each(|(column, value)| push(column, value));
     matrix.ptr.push(matrix.col.len() as i32);
-}
-
-/// Return as many dofs as there are motions, such that no combination of the motions leaves all these dofs at rest.
-/// They are the pivots of an elimination.
-fn pins(motions: &[Vec<f64>]) -> Vec<usize> {
-    let mut remaining = motions.to_vec();
-    let mut pins = Vec::new();
-    while let Some(mut motion) = remaining.pop() {
-        let Some(pin) = (0..motion.len()).max_by(|&i, &j| motion[i].abs().total_cmp(&motion[j].abs())) else { break };
-        let pivot = motion[pin];
-        motion.iter_mut().for_each(|u| *u /= pivot);
-        remaining.iter_mut().for_each(|other| axpy(-other[pin], &motion, other));
-        pins.push(pin);
-    }
-    pins
 }

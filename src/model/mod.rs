@@ -7,6 +7,7 @@
 
 pub mod body;
 mod coarse;
+mod compliance;
 pub mod dofs;
 pub mod field;
 pub mod joint;
@@ -19,6 +20,7 @@ pub use crate::solver::cost::{BodyFacts, compactness};
 pub use crate::solver::preset::INNER_TOLERANCE;
 pub use crate::solver::{BodyCounts, InterfaceDofs};
 pub use body::Body;
+pub use compliance::ComplianceStep;
 pub use dofs::{Distribution, Dofs};
 pub use field::Field;
 pub use joint::JointStep;

@@ -3,6 +3,7 @@
 //! Factorisations with the reference BLAS are up to 11 times slower, so a run reports the name. Only OpenBLAS has
 //! functions with `openblas_`, which are looked up by name.
 
+use super::call::fit;
 use super::error::{Error, Result};
 use super::ffi::{dpotrf_, dpotrs_};
 use std::ffi::{CStr, c_char, c_int, c_void};
@@ -44,17 +45,19 @@ pub fn cholesky(matrix: &mut [f64], n: usize) -> Result<bool> {
     Ok(info == 0)
 }
 
-/// Solve with a factor of [`cholesky`] in place: `x` is the right-hand side and becomes the solution, `n` entries.
+/// Solve with a factor of [`cholesky`] in place: `x` has right-hand sides one after the other, `n` entries each, and
+/// becomes their solutions.
 ///
 /// # Errors
 /// When a slice has the wrong length.
 pub fn cholesky_solve(factor: &[f64], n: usize, x: &mut [f64]) -> Result<()> {
     let (rows, lead, mut info) = (order(factor, n)?, order(factor, n)?.max(1), 0);
-    if x.len() != n {
-        return Err(Error::new(format!("{} numbers are no right-hand side of {n} rows", x.len())));
+    if !x.len().is_multiple_of(n) {
+        return Err(Error::new(format!("{} numbers are no right-hand sides of {n} rows", x.len())));
     }
-    // SAFETY: a factor of n x n numbers and one right-hand side of n.
-    unsafe { dpotrs_(UPPER.as_ptr(), &rows, &1, factor.as_ptr(), &lead, x.as_mut_ptr(), &lead, &mut info, 1) };
+    let columns: c_int = fit("LAPACK", "right-hand sides", x.len() / n.max(1))?;
+    // SAFETY: a factor of n x n numbers and right-hand sides of n.
+    unsafe { dpotrs_(UPPER.as_ptr(), &rows, &columns, factor.as_ptr(), &lead, x.as_mut_ptr(), &lead, &mut info, 1) };
     Ok(())
 }
 

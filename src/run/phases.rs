@@ -11,7 +11,7 @@ use crate::discretize::{self, Discrete};
 use crate::error::Result;
 use crate::estimate::{self, Estimate};
 use crate::interrupt::Interrupt;
-use crate::model::{Field, INNER_TOLERANCE, JointStep, LinearStep};
+use crate::model::{ComplianceStep, Field, INNER_TOLERANCE, JointStep, LinearStep};
 use crate::output;
 use crate::parallel::collectively;
 use crate::petsc::Session;
@@ -263,6 +263,7 @@ fn linear_step(session: &Session, built: &mut Built, start: &mut InitialGuess) -
     {
         return Ok(step);
     }
+    let compliance = if linear == Linear::Dense { ComplianceStep::new(model)? } else { None };
     let (interpolation, modes) = (interpolation.take(), std::mem::take(near_null_space));
     // a factorisation alone can do without complete nodes, with unknowns for rigid motions among them, if its rows are
     // not distributed
@@ -276,7 +277,10 @@ fn linear_step(session: &Session, built: &mut Built, start: &mut InitialGuess) -
         let block = if of_nodes { scene.dimension.value } else { 1 };
         Box::new(move |stiffness| Ok(Box::new(Krylov::new(&session, chosen, block, stiffness, &modes, interpolation)?)))
     };
-    let mut step: Box<dyn LinearStep> = Box::new(JointStep::new(model, of_nodes, is_dense, make)?);
+    let mut step: Box<dyn LinearStep> = match compliance {
+        Some(step) => Box::new(step),
+        None => Box::new(JointStep::new(model, of_nodes, is_dense, make)?),
+    };
     step.count_on(*counts);
     // the first system of the paper's iteration is the extension of its start
     let extends = scene.method.name == MethodName::Semismooth;

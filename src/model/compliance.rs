@@ -1,0 +1,314 @@
+//! The linear step (35) of condensed bodies by their compliance at the contact points.
+//!
+//! Let x = v + E a with the free rigid motions E and with v = 0 at as many dofs of each body, its *pins*, as it has
+//! such motions. K without the pins is positive definite, and K E = 0, so that the pins carry nothing while the forces
+//! on a body are in equilibrium. With the forces l = D B x of the springs D at the contact points,
+//!
+//! ```text
+//! v = K^-1 (r - B'l)                 F = B K^-1 B',   g = B K^-1 r
+//! (F + D^-1) l - B E a = g           the springs
+//! (B E)' l             = E'r         equilibrium of each body
+//! ```
+//!
+//! F does not depend on the springs. So a change of them costs one dense factorisation over the points that have a
+//! spring, instead of one over the dofs at the contact. An obstacle, or the offset of a gap, has motions and no K.
+
+use super::dofs::pins;
+use super::linear::{Failure, LinearSolution, LinearStep, Solved, System};
+use super::motions::Motions;
+use super::{Body, Field, Model};
+use crate::error::{Error, Kind, Result};
+use crate::exchange::{Exchange, broadcast};
+use crate::linalg::dot;
+use crate::petsc::{cholesky, cholesky_solve};
+use crate::solver::BodyCounts;
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use std::rc::Rc;
+use std::time::Instant;
+
+/// The linear step by the compliance of all bodies.
+pub struct ComplianceStep {
+    /// K without pins of each body; `None` for rigid parts and bodies of other ranks.
+    bodies: Vec<Option<PinnedStiffness>>,
+    /// F, n x n, on the first rank.
+    compliance: Vec<f64>,
+    /// B E of each motion, n each.
+    closings: Vec<Vec<f64>>,
+    /// The springs of the last solve.
+    springs: Vec<f64>,
+    /// Whether the first rank has factored the system for these springs.
+    is_factored: bool,
+    /// This system.
+    factored: Option<SpringSystem>,
+    exchange: Rc<dyn Exchange>,
+    counts: BodyCounts,
+    /// Counters of the solver that it replaces in a history.
+    earlier: BodyCounts,
+}
+
+impl ComplianceStep {
+    /// Make the compliance of the bodies of a model, which have their K. The result is `None` for bodies on springs to
+    /// the ground, whose compliance has few digits of the strains if the springs are soft, and where some K is not
+    /// positive definite without its pins. Collective.
+    ///
+    /// # Errors
+    /// Failures of LAPACK.
+    pub fn new(model: &Model) -> Result<Option<Self>> {
+        let n = model.points();
+        let mut is_missing = [f64::from(u8::from(model.bodies.iter().any(|slot| slot.sprung.is_some())))];
+        let mut bodies: Vec<Option<PinnedStiffness>> = model.bodies.iter().map(|_| None).collect();
+        let mut compliance = vec![0.0; n * n];
+        for (index, body) in model.locals().filter(|(index, _)| !model.bodies[*index].is_rigid) {
+            let Some(pinned) = PinnedStiffness::new(body)? else {
+                is_missing[0] += 1.0;
+                continue;
+            };
+            pinned.add_compliance(body, &points_of_rows(model, index), n, &mut compliance)?;
+            bodies[index] = Some(pinned);
+        }
+        model.exchange.sum(&mut is_missing);
+        if is_missing[0] > 0.0 {
+            return Ok(None);
+        }
+        model.exchange.sum(&mut compliance);
+        let (exchange, counts) = (model.exchange.clone(), BodyCounts::default());
+        let (springs, closings) = (vec![0.0; n], closings(model));
+        if exchange.rank() > 0 {
+            compliance = Vec::new();
+        }
+        Ok(Some(Self {
+            bodies,
+            compliance,
+            closings,
+            springs,
+            is_factored: false,
+            factored: None,
+            exchange,
+            counts,
+            earlier: counts,
+        }))
+    }
+
+    /// Take these springs, and factor their system if it has changed. Return whether it is positive definite, on the
+    /// first rank.
+    fn factor(&mut self, springs: &[f64]) -> Result<bool> {
+        if springs == self.springs {
+            self.counts.robin_skipped += 1;
+        } else {
+            self.counts.robin_updates += 1;
+            self.springs.copy_from_slice(springs);
+            self.is_factored = false;
+        }
+        if !self.is_factored {
+            self.is_factored = true;
+            let began = Instant::now();
+            if self.exchange.rank() == 0 {
+                self.factored = Some(SpringSystem::new(&self.compliance, springs, &self.closings)?);
+            }
+            let seconds = began.elapsed().as_secs_f64();
+            self.counts.dense_factorizations += 1;
+            self.counts.factor_seconds += seconds;
+            if self.counts.dense_factorizations == 1 {
+                self.counts.first_seconds = seconds;
+            }
+        }
+        Ok(self.factored.as_ref().is_some_and(|factored| factored.stiffness.is_some()))
+    }
+
+    /// Return K^-1 r for forces on the dofs of each body that this rank has; zero for others.
+    fn pinned_displacements(&self, r: &[Vec<f64>]) -> Result<Vec<Vec<f64>>> {
+        let of_body = |(body, r): (&Option<PinnedStiffness>, &Vec<f64>)| match body {
+            Some(body) => body.solve(r),
+            None => Ok(vec![0.0; r.len()]),
+        };
+        self.bodies.iter().zip(r).map(of_body).collect()
+    }
+
+    /// Return the forces l of the springs, n, and the amounts a, from g, n, and the works E'r. The first rank solves.
+    fn equilibrium(&self, g: &[f64], works: &[f64]) -> Result<(Vec<f64>, Vec<f64>)> {
+        broadcast(&*self.exchange, || match &self.factored {
+            Some(factored) => factored.solve(g, works),
+            None => Err(Error::new(Kind::Solver, "the springs of the contact were not set")),
+        })
+    }
+}
+
+impl LinearStep for ComplianceStep {
+    fn name(&self) -> &'static str {
+        "newton"
+    }
+
+    fn set_up(&mut self, springs: &[f64]) -> Result<()> {
+        self.factor(springs).map(|_| ())
+    }
+
+    fn renew(&mut self, model: &Model) -> bool {
+        // rigid parts may have other motions, and others of their motions may be free
+        let before = std::mem::replace(&mut self.closings, closings(model));
+        self.is_factored &= before == self.closings;
+        true
+    }
+
+    fn count_on(&mut self, earlier: BodyCounts) {
+        self.earlier = earlier;
+    }
+
+    fn begin_anew(&mut self) {
+        (self.counts, self.earlier) = (BodyCounts::default(), BodyCounts::default());
+    }
+
+    fn solve(&mut self, system: System) -> Result<Solved<LinearSolution>> {
+        let System { model, springs, residual, .. } = system;
+        let is_definite = self.factor(springs)?;
+        if !broadcast(&*self.exchange, || Ok(is_definite))? {
+            let reason = "the Robin matrix is not positive definite".to_owned();
+            return Ok(Err(Failure { body: None, reason }));
+        }
+        let began = Instant::now();
+        let mut g = closing_of(model, &self.pinned_displacements(residual)?);
+        model.exchange.sum(&mut g);
+        let motions = Motions::of(model);
+        let works = motions.work_of(model, residual);
+        let (force, amounts) = self.equilibrium(&g, works.as_slice())?;
+        let mut rest = residual.to_vec();
+        for (index, body) in model.locals().filter(|(index, _)| !model.bodies[*index].is_rigid) {
+            body.dofs().rows.add_transpose(-1.0, &model.at_rows(index, &force), &mut rest[index]);
+        }
+        let v = self.pinned_displacements(&rest)?;
+        let amounts = DVector::from_vec(amounts);
+        let own: f64 = v.iter().zip(residual).map(|(v, r)| dot(v, r)).sum();
+        let (field, sums) = Field::of_step(model, v, &motions.of_bodies(&amounts), &[own]);
+        self.counts.solves += 1;
+        self.counts.solve_seconds += began.elapsed().as_secs_f64();
+        let energy = sums[0] + amounts.dot(&works);
+        Ok(Ok(LinearSolution { field, energy, error: 0.0, is_exact: true }))
+    }
+
+    fn counts(&self) -> BodyCounts {
+        let mut counts = self.counts;
+        counts += self.earlier;
+        counts
+    }
+
+    fn describe(&self) -> String {
+        "dense Cholesky".to_owned()
+    }
+}
+
+/// Return the point of each contact row of a body.
+fn points_of_rows(model: &Model, body: usize) -> Vec<usize> {
+    model.trace_ranges(body).flatten().map(|place| place % model.points()).collect()
+}
+
+/// Return by how much each motion of all bodies closes the points, n each.
+fn closings(model: &Model) -> Vec<Vec<f64>> {
+    let motions = Motions::of(model);
+    let unit = |i: usize| DVector::from_fn(motions.count(), |k, _| f64::from(u8::from(k == i)));
+    (0..motions.count()).map(|i| motions.closing(&unit(i))).collect()
+}
+
+/// Return by how much displacements of the local bodies close the points, n.
+fn closing_of(model: &Model, u: &[Vec<f64>]) -> Vec<f64> {
+    let mut closing = vec![0.0; model.points()];
+    for (index, body) in model.locals().filter(|(index, _)| !model.bodies[*index].is_rigid) {
+        let mut rows = vec![0.0; body.dofs().rows.rows()];
+        body.dofs().rows.multiply(&u[index], &mut rows);
+        points_of_rows(model, index).into_iter().zip(rows).for_each(|(q, row)| closing[q] += row);
+    }
+    closing
+}
+
+/// K of a body without its pins, factored.
+struct PinnedStiffness {
+    count: usize,
+    pins: Vec<usize>,
+    /// The factor of K with ones on the diagonal at the pins.
+    factor: Vec<f64>,
+}
+
+impl PinnedStiffness {
+    /// Factor K of a body; `None` if K without pins is not positive definite.
+    fn new(body: &Body) -> Result<Option<Self>> {
+        let (stiffness, count) = (body.stiffness(), body.dofs().count);
+        let pins = pins(&body.dofs().unconstrained_modes);
+        let mut factor = vec![0.0; count * count];
+        for i in (0..count).filter(|i| !pins.contains(i)) {
+            stiffness.row(i).filter(|(j, _)| !pins.contains(j)).for_each(|(j, k)| factor[i * count + j] = k);
+        }
+        pins.iter().for_each(|&pin| factor[pin * count + pin] = 1.0);
+        Ok(cholesky(&mut factor, count)?.then_some(Self { count, pins, factor }))
+    }
+
+    /// Return K^-1 r.
+    fn solve(&self, r: &[f64]) -> Result<Vec<f64>> {
+        let mut v = r.to_vec();
+        self.pins.iter().for_each(|&pin| v[pin] = 0.0);
+        cholesky_solve(&self.factor, self.count, &mut v)?;
+        Ok(v)
+    }
+
+    /// Add B K^-1 B' to F, n x n, for the contact rows of the body at these points.
+    fn add_compliance(&self, body: &Body, points: &[usize], n: usize, compliance: &mut [f64]) -> Result<()> {
+        let rows = &body.dofs().rows;
+        let mut moved = vec![0.0; self.count * rows.rows()];
+        for (q, column) in moved.chunks_exact_mut(self.count.max(1)).enumerate() {
+            rows.row(q).filter(|(i, _)| !self.pins.contains(i)).for_each(|(i, b)| column[i] = b);
+        }
+        cholesky_solve(&self.factor, self.count, &mut moved)?;
+        for (column, &q) in moved.chunks_exact(self.count.max(1)).zip(points) {
+            for (p, &point) in points.iter().enumerate() {
+                compliance[q * n + point] += rows.row(p).map(|(i, b)| b * column[i]).sum::<f64>();
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The system of the points that have a spring.
+struct SpringSystem {
+    /// These points.
+    points: Vec<usize>,
+    /// The factor of F + D^-1 there.
+    factor: Vec<f64>,
+    /// B E there, one column a motion.
+    motions: DMatrix<f64>,
+    /// (F + D^-1)^-1 B E.
+    following: DMatrix<f64>,
+    /// The factor of (B E)' (F + D^-1)^-1 B E; `None` if nothing resists some motion.
+    stiffness: Option<Cholesky<f64, Dyn>>,
+    /// Number of all points.
+    count: usize,
+}
+
+impl SpringSystem {
+    fn new(compliance: &[f64], springs: &[f64], closings: &[Vec<f64>]) -> Result<Self> {
+        let count = springs.len();
+        let points: Vec<usize> = (0..count).filter(|&q| springs[q].recip().is_finite()).collect();
+        let m = points.len();
+        let mut factor = Vec::with_capacity(m * m);
+        for &q in &points {
+            factor.extend(points.iter().map(|&p| compliance[q * count + p]));
+        }
+        points.iter().enumerate().for_each(|(i, &q)| factor[i * m + i] += springs[q].recip());
+        let is_definite = cholesky(&mut factor, m)?;
+        let motions = DMatrix::from_fn(m, closings.len(), |i, k| closings[k][points[i]]);
+        let mut following = motions.clone();
+        cholesky_solve(&factor, m, following.as_mut_slice())?;
+        let stiffness = motions.tr_mul(&following);
+        // rounding makes it asymmetric
+        let stiffness = (0.5 * (&stiffness + stiffness.transpose())).cholesky().filter(|_| is_definite);
+        Ok(Self { points, factor, motions, following, stiffness, count })
+    }
+
+    /// Return l at all points and a, from g at all points and the works E'r.
+    fn solve(&self, g: &[f64], works: &[f64]) -> Result<(Vec<f64>, Vec<f64>)> {
+        let mut forces = DVector::from_iterator(self.points.len(), self.points.iter().map(|&q| g[q]));
+        cholesky_solve(&self.factor, self.points.len(), forces.as_mut_slice())?;
+        let lacking = DVector::from_column_slice(works) - self.motions.tr_mul(&forces);
+        let amounts = self.stiffness.as_ref().map_or(lacking.clone(), |factor| factor.solve(&lacking));
+        forces += &self.following * &amounts;
+        let mut all = vec![0.0; self.count];
+        self.points.iter().zip(forces.iter()).for_each(|(&q, force)| all[q] = *force);
+        Ok((all, amounts.as_slice().to_vec()))
+    }
+}
