@@ -15,9 +15,6 @@ mod side;
 
 pub use basis::Carriers;
 pub use fine::{Fine, FinePoint, FinePoints};
-pub use law::LayerLaw;
-#[cfg(test)]
-pub use law::Response;
 pub use mirror::Mirrors;
 pub use pair::{ContactPair, Coverage, Fault, LostPieces, add, assemble, moment_in_scene};
 pub use review::{Chords, ends};

@@ -2,7 +2,7 @@
 //! paired.
 
 use super::basis::{Carriers, PressureBasis};
-use super::law::{LawMaker, LayerLaw, LinearLaw};
+use super::law::{Law, LawMaker, Power};
 use super::pieces::{Intersection, WHOLE};
 use super::side::{FaceNode, ROUNDING, Side, along};
 use crate::error::{Error, Result};
@@ -12,7 +12,6 @@ use crate::linalg::{Csr, dot};
 use crate::problem::order::Order;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::{BTreeMap, HashMap};
-use std::rc::Rc;
 
 /// A discretised pair of surfaces: n contact points with one pressure each.
 ///
@@ -78,7 +77,7 @@ pub struct ContactPair {
     pub measure: Measure,
     /// Law of the layer. It does not go from rank to rank: whoever receives a pair makes its law anew.
     #[serde(skip, default = "no_law")]
-    pub law: Rc<dyn LayerLaw>,
+    pub law: Law,
     /// Coverage of each facet of side a.
     pub cover: Vec<Coverage>,
     /// Pieces that the search for common points has lost, if any.
@@ -94,8 +93,8 @@ fn measure<'de, R: Deserializer<'de>>(from: R) -> Result<Measure, R::Error> {
 }
 
 /// Return what stands for the law of a pair from another rank until it is made.
-fn no_law() -> Rc<dyn LayerLaw> {
-    Rc::new(LinearLaw { stiffness: 0.0 })
+fn no_law() -> Law {
+    Law::new(Power::linear(0.0))
 }
 
 /// The pieces of a pair that are lost because the search for their points failed.

@@ -17,7 +17,7 @@
 
 use super::start;
 use super::step::Equilibrium;
-use crate::contact::LayerLaw;
+use crate::contact::law::Law;
 use crate::linalg::dot;
 use crate::model::Model;
 use crate::model::layer::{Layer, in_series, surface_slopes};
@@ -60,7 +60,7 @@ pub(super) fn surface_energy(model: &Model, layer: &Layer) -> f64 {
 }
 
 /// Return the compression within c -+ `roundoff` at which the pressure of a law is nearest to p.
-fn nearest(law: &dyn LayerLaw, point: usize, c: f64, roundoff: f64, p: f64) -> f64 {
+fn nearest(law: &Law, point: usize, c: f64, roundoff: f64, p: f64) -> f64 {
     let difference = if p > 0.0 || law.is_bonded() { law.compression(point, p) - c } else { c.min(0.0) - c };
     if difference.is_finite() { c + difference.clamp(-roundoff, roundoff) } else { c }
 }
@@ -84,7 +84,7 @@ impl Reached {
         let (mut gap, mut mismatch, mut is_bound) = (0.0, 0.0f64, step.is_exact);
         for (q, pair, point) in model.each_point() {
             let p = pressure[q];
-            let c = nearest(&*pair.law, point, compression[q], roundoff[q], p);
+            let c = nearest(&pair.law, point, compression[q], roundoff[q], p);
             let changed = (p - layer.pressure[q]).powi(2) / rho[q];
             mismatch = mismatch.max((p - pair.law.pressure(point, c)).abs());
             let is_on_side = p >= 0.0 || pair.law.is_bonded();
@@ -354,7 +354,7 @@ mod tests {
     /// The law p = 4 c, and an open point, whose law has zero pressure at any c < 0.
     #[test]
     fn compressions_are_known_to_their_roundoff() {
-        let law = &*two_pairs().pairs[0].law;
+        let law = &two_pairs().pairs[0].law;
         let all = [(1.0, 4.2), (1.0, 5.0), (1.0, -1.0), (0.05, 0.0), (-1.0, 0.0)];
         assert_eq!(all.map(|(c, p)| nearest(law, 0, c, 0.1, p)), [1.05, 1.1, 0.9, 0.0, -1.0]);
         assert!(nearest(law, 0, f64::NAN, 0.1, 1.0).is_nan());

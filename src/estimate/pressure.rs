@@ -260,7 +260,7 @@ impl LayerError {
             };
             let met = |state: f64| {
                 let c = pair.law.resolvent(nearest, state, 1.0 / compliance);
-                (c, pair.law.response(nearest, c).pressure)
+                (c, pair.law.pressure(nearest, c))
             };
             let (c_h, p_h) = met(between(&|q| compression[q] + compliance * pressure[q]));
             let lacking: f64 = carriers().map(|(q, share)| share * beyond[q]).sum();

@@ -201,7 +201,7 @@ pub fn by_chords(done: &Done, i: usize) -> Option<String> {
     for q in 0..pair.len() {
         let state = compression[q] + height[q] + give * pressure[q];
         let curved = if give > 0.0 { pair.law.resolvent(q, state, 1.0 / give) } else { state };
-        changed += pair.area[q] * (pair.law.response(q, curved).pressure - pressure[q]).powi(2);
+        changed += pair.area[q] * (pair.law.pressure(q, curved) - pressure[q]).powi(2);
         whole += pair.area[q] * pressure[q].powi(2);
     }
     if changed <= BY_CHORDS.powi(2) * whole {

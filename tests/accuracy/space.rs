@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use winkler::api::Order;
 use winkler::api::load as load_scene;
 use winkler::internals::Interrupt;
-use winkler::internals::contact::law::{self, OwnLaws};
+use winkler::internals::contact::law::{self, Law, OwnLaws};
 use winkler::internals::contact::pieces::{self, Cut, Reach};
 use winkler::internals::contact::{Carriers, ContactPair, Side, assemble};
 use winkler::internals::fem::{Frame, Space, assemble as fem};
@@ -103,8 +103,10 @@ fn pair_on<const D: usize>(
     let (a, b) = (side(0), side(1));
     let shared = cut(&a, &b, &Reach::between(&a, &b, 60.0, None));
     let layer = load_scene(&case("patch"), &[]).expect("a scene").contacts.remove(0).layer;
-    let pair =
-        assemble(&a, &b, [0, 1], &shared, &|_| 0.0, &|at| law::make(&layer, &OwnLaws::default(), at)).expect("a pair");
+    let pair = assemble(&a, &b, [0, 1], &shared, &|_| 0.0, &|at| {
+        Ok(Law { compression: law::make(&layer, &OwnLaws::default(), at)?, tension: None })
+    })
+    .expect("a pair");
     (pair, spaces)
 }
 
