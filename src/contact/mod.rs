@@ -13,9 +13,10 @@ pub mod pieces;
 mod review;
 mod side;
 
-pub use basis::Carriers;
+pub use basis::PressureBasis;
 pub use fine::{Fine, FinePoint, FinePoints};
 pub use mirror::Mirrors;
-pub use pair::{ContactPair, Coverage, Fault, LostPieces, add, assemble, moment_in_scene};
+pub use pair::{ContactPair, Fault, LostPieces, add, assemble, moment_in_scene};
+pub use pieces::Coverage;
 pub use review::{Chords, ends};
 pub use side::Side;

@@ -1,9 +1,9 @@
 //! The arrays of a contact pair, which are all that the solution methods know of two surfaces, and how much of them is
 //! paired.
 
-use super::basis::{Carriers, PressureBasis};
+use super::basis::PressureBasis;
 use super::law::{Law, LawMaker, Power};
-use super::pieces::{Intersection, WHOLE};
+use super::pieces::{Coverage, Intersection};
 use super::side::{FaceNode, ROUNDING, Side, along};
 use crate::error::{Error, Result};
 use crate::fem::element::{self, Rule};
@@ -148,22 +148,20 @@ fn integrate<const D: usize>(
     common: &Intersection<D>,
 ) -> (BTreeMap<u32, Accumulator>, Vec<Coverage>) {
     let mut points: BTreeMap<u32, Accumulator> = BTreeMap::new();
-    let mut carriers = vec![None; a.facets.count()];
+    let mut all = common.cover.clone();
+    let order = a.facets.order;
+    let rule = element::rule(D, if order == Order::P1 { 2 } else { 2 * order.degree() + 1 });
     for chunk in common.points.chunk_by(|p, q| p.facet_a == q.facet_a) {
-        let facet = chunk[0].facet_a;
-        let nodes = a.on_facet(facet);
-        let basis = PressureBasis::on(a.facets.order, nodes.len(), chunk, &b.facets, a.axis_of(facet));
-        carriers[facet] = Some(basis.carriers());
+        let cover = &mut all[chunk[0].facet_a];
+        let covered: f64 = chunk.iter().map(|point| point.weight).sum();
+        cover.share = covered / facet_measure(a, chunk[0].facet_a, &rule);
+        let basis = PressureBasis::on(order, a, &b.facets, cover.ends, chunk);
+        let nodes = a.on_facet(chunk[0].facet_a);
         for point in chunk {
-            let (phi, shapes) =
-                (element::values(a.facets.order, &point.at_a), basis.shapes(a.facets.order, &point.at_a));
-            let psi = element::values(b.facets.order, &point.at_b);
+            let (phi, psi) = (element::values(order, &point.at_a), element::values(b.facets.order, &point.at_b));
             let others = b.on_facet(point.facet_b);
-            for (i, &node) in nodes.iter().enumerate() {
-                let mu = point.weight * basis.value(i, &shapes, &point.at_a);
-                if mu == 0.0 {
-                    continue;
-                }
+            for (&node, mu) in nodes.iter().zip(&basis.functions(&point.at_a)).filter(|(_, mu)| **mu != 0.0) {
+                let mu = point.weight * mu;
                 let sum = points.entry(node).or_default();
                 sum.weight += mu;
                 sum.gap += mu * point.gap;
@@ -171,8 +169,10 @@ fn integrate<const D: usize>(
                 others.iter().zip(&psi).for_each(|(&n, psi)| *sum.sides[1].entry(n).or_default() += mu * psi);
             }
         }
+        cover.basis = Some(basis);
     }
-    (points, Coverage::of(a, common, &carriers))
+    all.iter_mut().filter(|cover| cover.is_whole()).for_each(|cover| cover.lost = 0);
+    (points, all)
 }
 
 /// Assemble the arrays of a pair from the common pieces of its surfaces.
@@ -435,56 +435,18 @@ impl ContactPair {
 
     /// Return the number of facets of side a without a partner.
     pub fn uncovered(&self) -> usize {
-        self.cover.iter().filter(|facet| facet.carriers.is_none()).count()
+        self.cover.iter().filter(|facet| facet.share == 0.0).count()
     }
 
     /// Return the number of partially covered facets of side a that take the hat functions of their vertices.
     pub fn averaged(&self) -> usize {
-        let averaged = |facet: &&Coverage| facet.carriers == Some(Carriers::Vertices) && !facet.is_whole();
-        self.cover.iter().filter(averaged).count()
+        let partial = self.cover.iter().filter(|facet| !facet.is_whole());
+        partial.filter(|facet| facet.basis.as_ref().is_some_and(|basis| basis.is_averaged)).count()
     }
 
     /// Return whether the pair has no points, which no pair from [`assemble`] has.
     pub fn is_empty(&self) -> bool {
         self.area.is_empty()
-    }
-}
-
-/// The coverage of a facet of side a by facets of side b.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Coverage {
-    /// Share of its length (area) that is paired.
-    pub share: f64,
-    /// Number of pieces, and of points of pieces, that the search has lost, if it is not fully paired.
-    pub lost: usize,
-    /// Which of its nodes carry points; `None` where it has no partner.
-    pub carriers: Option<Carriers>,
-    /// Whether facets of side b lie before it that are too far away or inclined by too much.
-    pub is_cut_short: bool,
-}
-
-impl Coverage {
-    /// Return the coverage of each facet, from the common pieces and the nodes that carry points.
-    fn of<const D: usize>(a: &Side<D>, common: &Intersection<D>, carriers: &[Option<Carriers>]) -> Vec<Self> {
-        let mut covered = vec![0.0; a.facets.count()];
-        common.points.iter().for_each(|point| covered[point.facet_a] += point.weight);
-        let rule = element::rule(D, if a.facets.order == Order::P1 { 2 } else { 2 * a.facets.order.degree() + 1 });
-        let of_facet = |i: usize| {
-            let refused = &common.refused[i];
-            let found = Self {
-                share: covered[i] / facet_measure(a, i, &rule),
-                lost: 0,
-                carriers: carriers[i],
-                is_cut_short: refused.is_inclined || !refused.far.is_empty(),
-            };
-            Self { lost: if found.is_whole() { 0 } else { refused.lost }, ..found }
-        };
-        (0..covered.len()).map(of_facet).collect()
-    }
-
-    /// Return whether the facet is fully paired.
-    pub fn is_whole(&self) -> bool {
-        self.share > WHOLE
     }
 }
 
