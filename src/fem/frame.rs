@@ -14,9 +14,9 @@
 //!   all other dofs, and with the farthest node as the pole no node moves by more than v. In the plane theta is the
 //!   first dof, and the other one is zero.
 //!
-//! The dofs of tied nodes other than the pole must be prescribed as zero. In v every support is a prescribed dof, and
-//! the blocks of K keep their size. Dofs of a displacement are asked for rigid motions alone, whose rotation is known,
-//! so that no inverse of T is needed.
+//! The dofs of tied nodes other than the pole must be prescribed as zero: they are what a displacement differs from the
+//! constraint. In v every support is a prescribed dof, and the blocks of K keep their size. Dofs of a displacement are
+//! asked for rigid motions alone, whose rotation is known, so that no inverse of T is needed.
 
 use super::{RigidMotion, cross, length, minus, pad};
 use crate::exchange::Plain;
@@ -162,14 +162,17 @@ impl<const D: usize> Frame<D> {
         u
     }
 
-    /// Return the values at the dofs of a node in a rigid motion, where `x` is the place of the node.
-    pub fn dofs(&self, node: u32, motion: &RigidMotion<D>, x: &[f64; D]) -> [f64; D] {
+    /// Return the values at the dofs of a node in a rigid motion. `x` gives the place of a node.
+    pub fn dofs(&self, node: u32, motion: &RigidMotion<D>, x: impl Fn(u32) -> [f64; D]) -> [f64; D] {
+        let at = |node: u32| motion.at(&x(node));
         if let Some(size) = self.poles.get(&node) {
             return std::array::from_fn(|k| size * dot(&motion.rotation(), &axis::<D>(k)));
         }
         match self.row(node) {
-            [] => motion.at(x),
-            [(own, turned)] if *own == node => turned.tr_mul(&SVector::from(motion.at(x))).into(),
+            [] => at(node),
+            [(own, turned)] if *own == node => turned.tr_mul(&SVector::from(at(node))).into(),
+            [(master, _)] => minus(at(node), at(*master)),
+            // a surface that turns follows any rigid motion
             _ => [0.0; D],
         }
     }
