@@ -221,14 +221,12 @@ mod tests {
             assert!((sum - linear(&L)).abs() < 1e-14, "{basis:?}");
             assert!((0..6).all(|i| basis.carries(i) == carried.contains(&i)), "{basis:?}");
         }
-        let points = |facet_b| {
-            element::rule(2, 5).iter().map(move |(l, weight)| {
-                let at = [l[0], l[1]];
-                // the weight of a ring about the axis at node 0
-                IntegrationPoint { facet_a: 0, at_a: at, facet_b, at_b: at, weight: weight * l[1], gap: 0.0 }
-            })
+        // the weight of a ring about the axis at node 0
+        let point = |(l, weight): (&[f64], f64)| {
+            let at = [l[0], l[1]];
+            IntegrationPoint { facet_a: 0, at_a: at, facet_b: 0, at_b: at, weight: weight * l[1], gap: 0.0 }
         };
-        let chunk: Vec<IntegrationPoint<2>> = points(0).collect();
+        let chunk: Vec<IntegrationPoint<2>> = element::rule(2, 5).iter().map(point).collect();
         let quadratic = |s: f64| s * (1.0 - 3.0 * s);
         for (axis, f) in [(None, &quadratic as &dyn Fn(f64) -> f64), (Some(0), &|s| 2.0 - 3.0 * s)] {
             let basis = PressureBasis::dual(Order::P2, axis, [0.0, 1.0], &chunk).expect("a basis");

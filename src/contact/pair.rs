@@ -80,8 +80,6 @@ pub struct ContactPair {
     pub law: Law,
     /// Coverage of each facet of side a.
     pub cover: Vec<Coverage>,
-    /// Pieces that the search for common points has lost, if any.
-    pub lost: Option<LostPieces>,
 }
 
 /// What the areas of contact points are: `"length"` or `"area"`.
@@ -95,33 +93,6 @@ fn measure<'de, R: Deserializer<'de>>(from: R) -> Result<Measure, R::Error> {
 /// Return what stands for the law of a pair from another rank until it is made.
 fn no_law() -> Law {
     Law::new(Power::linear(0.0))
-}
-
-/// The pieces of a pair that are lost because the search for their points failed.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct LostPieces {
-    /// Number of lost pieces and lost points of pieces.
-    pub pieces: usize,
-    /// Uncovered area (length) of the facets that lost pieces, as a share of side a.
-    pub share: f64,
-    /// Middle of the facet with the largest uncovered area (x, y, z).
-    pub at: [f64; 3],
-}
-
-impl LostPieces {
-    /// Return the losses of the facets of side a with this coverage, `None` if nothing was lost.
-    fn of<const D: usize>(a: &Side<D>, coverage: &[Coverage]) -> Option<Self> {
-        let uncovered = |&(i, facet): &(usize, &Coverage)| (1.0 - facet.share) * length(a.area(i));
-        let lost = || coverage.iter().enumerate().filter(|(_, facet)| facet.lost > 0);
-        let (worst, _) = lost().max_by(|p, q| uncovered(p).total_cmp(&uncovered(q)))?;
-        let whole = a.mean_measure() * coverage.len() as f64;
-        let middle = element::interpolate(&a.facets.coordinates(worst, a.space)[..D], &[1.0 / D as f64; D]);
-        Some(Self {
-            pieces: lost().map(|(_, facet)| facet.lost).sum(),
-            share: lost().map(|facet| uncovered(&facet)).sum::<f64>() / whole,
-            at: a.space.in_scene(middle),
-        })
-    }
 }
 
 /// Why a pair could not be assembled.
@@ -151,10 +122,10 @@ fn integrate<const D: usize>(
     let mut all = common.cover.clone();
     let order = a.facets.order;
     let rule = element::rule(D, if order == Order::P1 { 2 } else { 2 * order.degree() + 1 });
+    (0..all.len()).for_each(|i| all[i].measure = facet_measure(a, i, &rule));
     for chunk in common.points.chunk_by(|p, q| p.facet_a == q.facet_a) {
         let cover = &mut all[chunk[0].facet_a];
-        let covered: f64 = chunk.iter().map(|point| point.weight).sum();
-        cover.share = covered / facet_measure(a, chunk[0].facet_a, &rule);
+        cover.share = chunk.iter().map(|point| point.weight).sum::<f64>() / cover.measure;
         let basis = PressureBasis::on(order, a, &b.facets, cover.ends, chunk);
         let nodes = a.on_facet(chunk[0].facet_a);
         for point in chunk {
@@ -226,7 +197,6 @@ pub fn assemble<const D: usize>(
         along_curve: D == 2,
         measure: if D == 2 && !a.space.axisymmetric { "length" } else { "area" },
         law,
-        lost: LostPieces::of(a, &cover),
         cover,
     };
     for (index, side) in [a, b].into_iter().enumerate() {
@@ -436,6 +406,11 @@ impl ContactPair {
     /// Return the number of facets of side a without a partner.
     pub fn uncovered(&self) -> usize {
         self.cover.iter().filter(|facet| facet.share == 0.0).count()
+    }
+
+    /// Return the number of pieces, and of points of pieces, that the search for common points has lost.
+    pub fn pieces_lost(&self) -> usize {
+        self.cover.iter().map(|facet| facet.lost).sum()
     }
 
     /// Return the number of partially covered facets of side a that take the hat functions of their vertices.

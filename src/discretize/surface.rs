@@ -93,6 +93,13 @@ impl ContactSurface {
         &self.points
     }
 
+    /// Return the middle of the corners of a facet.
+    pub fn middle(&self, facet: usize) -> [f64; 3] {
+        let corners = &self.connectivity[facet * self.cell.stride()..][..self.cell.dimension + 1];
+        let mean = |c: usize| corners.iter().map(|&at| self.points[at as usize][c]).sum::<f64>() / corners.len() as f64;
+        std::array::from_fn(mean)
+    }
+
     /// Return contact points that are neighbours on a facet.
     pub fn neighbours(&self) -> &[Neighbours] {
         &self.neighbours

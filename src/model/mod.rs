@@ -437,7 +437,6 @@ pub(crate) mod sample {
             measure: "length",
             law,
             cover: Vec::new(),
-            lost: None,
         };
         let body = |side: usize, row_stiffness: [f64; 4]| BodySlot {
             name: side.to_string(),

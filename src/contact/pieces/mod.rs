@@ -108,7 +108,9 @@ pub struct Reach {
 /// What lies before a facet of side a.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Coverage {
-    /// Share of its length (area) that is paired.
+    /// Its length (area), in bodies of revolution the area of a ring.
+    pub measure: f64,
+    /// Share of it that is paired.
     pub share: f64,
     /// Ends of the part of an edge that is paired, from 0 to 1 along it.
     pub ends: [f64; 2],
@@ -125,7 +127,15 @@ pub struct Coverage {
 
 impl Default for Coverage {
     fn default() -> Self {
-        Self { share: 0.0, ends: [1.0, 0.0], basis: None, far: BTreeSet::new(), is_inclined: false, lost: 0 }
+        Self {
+            measure: 0.0,
+            share: 0.0,
+            ends: [1.0, 0.0],
+            basis: None,
+            far: BTreeSet::new(),
+            is_inclined: false,
+            lost: 0,
+        }
     }
 }
 
