@@ -160,7 +160,7 @@ fn each_pair(built: &Built) -> Vec<String> {
             "  contact {a} - {b}: {} points on {}, {} {:.6}, gap {} to {}{without}",
             pair.len(),
             pair.surfaces[0],
-            pair.measure,
+            pair.measure.name(),
             pair.area.iter().sum::<f64>(),
             sci(low, 3),
             sci(high, 3)
@@ -177,7 +177,7 @@ fn all_pairs(built: &Built) -> Vec<String> {
         "  {} contacts: {} points, {} {:.6}, gap {} to {}; --json has every one",
         pairs.len(),
         pairs.iter().map(ContactPair::len).sum::<usize>(),
-        pairs[0].measure,
+        pairs[0].measure.name(),
         pairs.iter().flat_map(|pair| &pair.area).sum::<f64>(),
         sci(low, 3),
         sci(high, 3)

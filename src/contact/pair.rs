@@ -9,8 +9,7 @@ use crate::error::{Error, Result};
 use crate::fem::element::{self, Rule};
 use crate::fem::{Frame, Space, area_vector, cross, length, pad};
 use crate::linalg::{Csr, dot};
-use crate::problem::order::Order;
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
 
 /// A discretised pair of surfaces: n contact points with one pressure each.
@@ -72,8 +71,7 @@ pub struct ContactPair {
     pub uncertainty: f64,
     /// Whether the points run along curves in their order (plane problems).
     pub along_curve: bool,
-    /// What `area` measures: `"length"`, or in space and for bodies of revolution `"area"`.
-    #[serde(deserialize_with = "measure")]
+    /// What `area` measures: lengths, or in space and for bodies of revolution areas.
     pub measure: Measure,
     /// Law of the layer. It does not go from rank to rank: whoever receives a pair makes its law anew.
     #[serde(skip, default = "no_law")]
@@ -82,12 +80,21 @@ pub struct ContactPair {
     pub cover: Vec<Coverage>,
 }
 
-/// What the areas of contact points are: `"length"` or `"area"`.
-pub type Measure = &'static str;
+/// What the areas of contact points are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Measure {
+    Length,
+    Area,
+}
 
-/// Return what the areas of a pair from another rank are.
-fn measure<'de, R: Deserializer<'de>>(from: R) -> Result<Measure, R::Error> {
-    String::deserialize(from).map(|name| if name == "length" { "length" } else { "area" })
+impl Measure {
+    /// Return the word for it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Length => "length",
+            Self::Area => "area",
+        }
+    }
 }
 
 /// Return what stands for the law of a pair from another rank until it is made.
@@ -121,7 +128,7 @@ fn integrate<const D: usize>(
     let mut points: BTreeMap<u32, Accumulator> = BTreeMap::new();
     let mut all = common.cover.clone();
     let order = a.facets.order;
-    let rule = element::rule(D, if order == Order::P1 { 2 } else { 2 * order.degree() + 1 });
+    let rule = element::rule_of_products(D, order);
     (0..all.len()).for_each(|i| all[i].measure = facet_measure(a, i, &rule));
     for chunk in common.points.chunk_by(|p, q| p.facet_a == q.facet_a) {
         let cover = &mut all[chunk[0].facet_a];
@@ -195,7 +202,7 @@ pub fn assemble<const D: usize>(
         moment: [Vec::new(), Vec::new()],
         uncertainty: a.tilt().max(b.tilt()),
         along_curve: D == 2,
-        measure: if D == 2 && !a.space.axisymmetric { "length" } else { "area" },
+        measure: if D == 2 && !a.space.axisymmetric { Measure::Length } else { Measure::Area },
         law,
         cover,
     };

@@ -15,7 +15,7 @@
 use super::approach::mean_normal;
 use super::groups::point;
 use super::whole::NO_WORK;
-use crate::contact::ContactPair;
+use crate::contact::{ContactPair, Measure};
 use crate::error::{Error, Result};
 use crate::fem::cross;
 use crate::linalg::{Csr, dot, length};
@@ -38,7 +38,7 @@ impl<'a> Obstacle<'a> {
     pub fn new(pair: &'a ContactPair, spec: &'a ContactSpec) -> Self {
         let area: f64 = pair.area.iter().sum();
         let middle = |c: usize| pair.area.iter().zip(&pair.position).map(|(w, x)| w * x[c]).sum::<f64>() / area;
-        let is_revolved = pair.along_curve && pair.measure == "area";
+        let is_revolved = pair.along_curve && pair.measure == Measure::Area;
         let middle = |c: usize| if is_revolved && c == 0 { 0.0 } else { middle(c) };
         let at = spec.at.map_or_else(|| [0, 1, 2].map(middle), |at| at.0);
         Self { pair, spec, normal: mean_normal(pair).unwrap_or_default(), at }

@@ -212,7 +212,7 @@ impl<'a, const D: usize> Recovery<'a, D> {
     /// Return the squared energy norm of the recovered minus the discrete stress on each cell.
     fn energy_errors(&self) -> Vec<f64> {
         let order = self.space.order;
-        let rule = element::rule(D + 1, (2 * order.degree() + 1).max(5)).with_shapes(order);
+        let rule = element::rule_of_products(D + 1, order.max(Order::P2)).with_shapes(order);
         if order == Order::P1 && !self.space.axisymmetric {
             return (0..self.space.cell_count()).map(|index| self.energy_error_of_linear(index, &rule)).collect();
         }
@@ -296,8 +296,7 @@ impl<'a, const D: usize> Recovery<'a, D> {
     fn interpolation_error(&self) -> (Vec<f64>, Vec<f64>) {
         let space = self.space;
         // The gradient of b has one degree more than the elements, and that of v has one less.
-        let degree = if space.order == Order::P1 { 2 } else { 2 * space.order.degree() + 1 };
-        let rule = element::rule(D + 1, degree).with_shapes(space.order);
+        let rule = element::rule_of_products(D + 1, space.order).with_shapes(space.order);
         let mut residual = vec![0.0; space.dofs()];
         let of_cell = |index: usize| {
             let mut energy = 0.0;

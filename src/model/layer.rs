@@ -6,6 +6,7 @@
 //! the bodies give. Robin sweeps take the state at that compression.
 
 use super::Model;
+use crate::contact::Measure;
 
 /// The state of the layer of every contact point, with the tangent of its law.
 #[derive(Debug, Clone, Default)]
@@ -127,7 +128,7 @@ pub fn contact_slopes(model: &Model, closed: impl Fn(usize) -> bool) -> Vec<f64>
     let mut slopes = Vec::with_capacity(points);
     for (i, pair) in model.pairs.iter().enumerate() {
         let area: f64 = model.range(i).filter(|&q| closed(q)).map(|q| model.area[q]).sum();
-        let is_plane = pair.measure == "length";
+        let is_plane = pair.measure == Measure::Length;
         let half = if is_plane { 0.5 * area } else { (area / std::f64::consts::PI).sqrt() };
         let foundation = FOUNDATION[usize::from(!is_plane)] / half;
         slopes.extend(model.range(i).map(|q| {

@@ -387,6 +387,7 @@ fn free_gap(pair: &ContactPair, q: usize) -> f64 {
 #[cfg(test)]
 pub(crate) mod sample {
     use super::*;
+    use crate::contact::Measure;
     use crate::contact::law::{Law, LayerLaw, Power};
     use crate::linalg::Csr;
 
@@ -434,7 +435,7 @@ pub(crate) mod sample {
             resultant: [vec![[0.0; 3]; 2], vec![[0.0; 3]; 2]],
             moment: [vec![[0.0; 3]; 2], vec![[0.0; 3]; 2]],
             along_curve: true,
-            measure: "length",
+            measure: Measure::Length,
             law,
             cover: Vec::new(),
         };

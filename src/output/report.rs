@@ -420,15 +420,6 @@ impl Default for Extent {
 }
 
 impl Extent {
-    /// Return the sizes of the parts in contact and open. `measure` says whether these are lengths, see
-    /// [`measure`](crate::contact::ContactPair::measure).
-    pub fn new(measure: &str, contact: f64, open: f64) -> Self {
-        match measure {
-            "length" => Self::Length { contact_length: contact, open_length: open },
-            _ => Self::Area { contact_area: contact, open_area: open },
-        }
-    }
-
     /// Return whether the sizes are areas.
     pub fn is_area(&self) -> bool {
         matches!(self, Self::Area { .. })

@@ -2,10 +2,19 @@
 //! areas of the points.
 
 use super::stages::Done;
+use crate::contact::Measure;
 use crate::discretize::Neighbours;
 use crate::estimate::softness;
 use crate::fem::{length, minus};
 use crate::output::Extent;
+
+/// Return the sizes of the parts in contact and open.
+fn extent(measure: Measure, contact: f64, open: f64) -> Extent {
+    match measure {
+        Measure::Length => Extent::Length { contact_length: contact, open_length: open },
+        Measure::Area => Extent::Area { contact_area: contact, open_area: open },
+    }
+}
 
 /// Return the size of the contact of pair `i`, and in the plane the points where it begins or ends, in the order of the
 /// contact points.
@@ -20,7 +29,7 @@ pub fn of(done: &Done, i: usize) -> (Extent, Vec<[f64; 3]>) {
     if !pair.along_curve || neighbours.is_empty() {
         let areas = || pair.area.iter().zip(c);
         let sum = |counts: fn(f64) -> bool| areas().filter(|(_, c)| counts(**c)).fold(0.0, |sum, (area, _)| sum + area);
-        return (Extent::new(pair.measure, sum(|c| c > 0.0), sum(|c| c < 0.0)), Vec::new());
+        return (extent(pair.measure, sum(|c| c > 0.0), sum(|c| c < 0.0)), Vec::new());
     }
     let soft = if pair.law.is_bonded() { 0.0 } else { softness(model, i) };
     let (mut closed, mut open, mut all, mut ends) = (0.0, 0.0, 0.0, Vec::new());
@@ -29,7 +38,7 @@ pub fn of(done: &Done, i: usize) -> (Extent, Vec<[f64; 3]>) {
         let [x, y] = [q, r].map(|q| pair.position[q]);
         let size = length(minus(y, x));
         // an interval of a body of revolution is a ring, whose radius grows along it
-        let radius = |part: f64| if pair.measure == "area" { x[0] + 0.5 * part * (y[0] - x[0]) } else { 1.0 };
+        let radius = |part: f64| if pair.measure == Measure::Area { x[0] + 0.5 * part * (y[0] - x[0]) } else { 1.0 };
         let measure = |part: f64| share * size * part * radius(part);
         let is_divided = c[q] > 0.0 && c[r] < 0.0;
         let part = if is_divided { end([c[q], -c[r]], soft * size * p[q]) } else { f64::from(u8::from(c[q] > 0.0)) };
@@ -42,7 +51,7 @@ pub fn of(done: &Done, i: usize) -> (Extent, Vec<[f64; 3]>) {
     }
     let scale = pair.area.iter().sum::<f64>() / all;
     ends.sort_by_key(|(q, _)| *q);
-    (Extent::new(pair.measure, scale * closed, scale * open), ends.into_iter().map(|(_, x)| x).collect())
+    (extent(pair.measure, scale * closed, scale * open), ends.into_iter().map(|(_, x)| x).collect())
 }
 
 /// Return where contact ends between a closed and an open point, as a share t of the interval from the closed one. `c`

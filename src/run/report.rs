@@ -336,7 +336,7 @@ pub fn contact_surface(name: &str, done: &Done, i: usize, displacement: &[[f64; 
             FieldArray::new("compression", 1, layer.compression[range.clone()].to_vec()),
             FieldArray::new("pressure", 1, layer.pressure[range].to_vec()),
             FieldArray::new("normal", 3, pair.normal.as_flattened().to_vec()),
-            FieldArray::new(pair.measure, 1, pair.area.clone()),
+            FieldArray::new(pair.measure.name(), 1, pair.area.clone()),
         ],
     );
     grid.at_points.push(FieldArray::new("displacement", 3, displacement.as_flattened().to_vec()));

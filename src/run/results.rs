@@ -224,7 +224,7 @@ pub fn names_of_results(built: &Built) -> ResultNames {
         pairs: pair_names(built),
         reactions: numbered(reactions),
         dimension: built.scene.dimension.value,
-        measure: built.discrete.model.pairs.first().map_or("length", |pair| pair.measure),
+        measure: built.discrete.model.pairs.first().map_or("length", |pair| pair.measure.name()),
     }
 }
 

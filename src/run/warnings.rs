@@ -5,7 +5,7 @@ use super::in_words;
 use super::results;
 use super::stages::Done;
 use super::verdict::{is_solved, without_shear};
-use crate::contact::{Chords, Coverage};
+use crate::contact::{Chords, Coverage, Measure};
 use crate::discretize::Discrete;
 use crate::estimate::{Cause, Estimate, softness};
 use crate::fem::{length, minus};
@@ -195,7 +195,7 @@ pub fn by_chords(done: &Done, i: usize) -> Option<String> {
         done.built.discrete.contacts[i].chords.as_ref().filter(|_| done.outcome.status.is_solved())?;
     let (compression, pressure) = (&layer.compression[range.clone()], &layer.pressure[range]);
     let closed: f64 = (0..pair.len()).filter(|&q| pressure[q] > 0.0).map(|q| pair.area[q]).sum();
-    let extent = if pair.measure == "length" { closed } else { closed.sqrt() };
+    let extent = if pair.measure == Measure::Length { closed } else { closed.sqrt() };
     let give = softness(done.model(), i) * if *wave > 0.0 { *wave } else { extent } / PI;
     let (mut changed, mut whole) = (0.0, 0.0);
     for q in 0..pair.len() {
@@ -240,7 +240,7 @@ fn lost(discrete: &Discrete, i: usize) -> Option<String> {
         pair.pieces_lost(),
         pair.surfaces[0],
         of_facets().sum::<f64>() / pair.cover.iter().map(|cover| cover.measure).sum::<f64>(),
-        pair.measure,
+        pair.measure.name(),
         place(surface.middle(worst))
     ))
 }

@@ -16,7 +16,6 @@ use super::basis::PressureBasis;
 use super::side::Side;
 use crate::fem::{area_vector, element, length, minus};
 use crate::linalg::{around, dot};
-use crate::problem::order::Order;
 use facet::{Facet, Rays, plus};
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
@@ -60,12 +59,8 @@ impl<const D: usize> Intersection<D> {
     /// Return the integration points of all facets of a side that is before a rigid obstacle. The obstacle has the
     /// facets of the side itself, at no distance, so that its forces are the opposite ones.
     pub fn of_one(a: &Side<D>) -> Self {
-        let degree = match (D, a.facets.order) {
-            (2, order) => 2 * order.degree() + 3,
-            (_, Order::P1) => 2,
-            _ => 5,
-        };
-        let rule = element::rule(D, degree);
+        let order = a.facets.order;
+        let rule = if D == 2 { element::rule(2, 2 * order.degree() + 3) } else { element::rule_of_products(D, order) };
         let mut points = Vec::new();
         for facet in 0..a.facets.count() {
             let x = a.facets.coordinates(facet, a.space);

@@ -34,8 +34,7 @@ const PARTS: [usize; 4] = [1, 2, 4, 8];
 pub fn in_space(a: &Side<3>, b: &Side<3>, reach: &Reach) -> Intersection<3> {
     let search = BoxTree::new(b);
     let facets_b: Vec<Facet<3>> = (0..b.facets.count()).map(|i| Facet::of(b, i)).collect();
-    let quadratic = a.facets.order == Order::P2 || b.facets.order == Order::P2;
-    let rule = element::rule(3, if quadratic { 5 } else { 2 });
+    let rule = element::rule_of_products(3, a.facets.order.max(b.facets.order));
     let mut common = Intersection { points: Vec::new(), cover: vec![Coverage::default(); a.facets.count()] };
     for i in 0..a.facets.count() {
         let facet = Facet::of(a, i);
