@@ -213,52 +213,8 @@ impl<'a, const D: usize> Recovery<'a, D> {
     fn energy_errors(&self) -> Vec<f64> {
         let order = self.space.order;
         let rule = element::rule_of_products(D + 1, order.max(Order::P2)).with_shapes(order);
-        if order == Order::P1 && !self.space.axisymmetric {
-            return (0..self.space.cell_count()).map(|index| self.energy_error_of_linear(index, &rule)).collect();
-        }
         let of_cell = |index: usize| self.product(index, &rule, |point| [self.strain_beyond(point); 2]);
         (0..self.space.cell_count()).map(of_cell).collect()
-    }
-
-    /// Return the squared energy error of a linear cell. Its map and its discrete strain are constant, so that both are
-    /// computed once.
-    fn energy_error_of_linear(&self, index: usize, rule: &element::Rule) -> f64 {
-        let Some(first) = self.space.points(index, rule).flatten().next() else { return 0.0 };
-        let errors = self.strain_errors(first.cell, &first.slope(&self.displacement));
-        let x = self.space.cell_nodes(index);
-        let mut sum = 0.0;
-        for (l, weight) in rule.iter() {
-            let products = (0..=D).flat_map(|k| (k..=D).map(move |m| l[k] * l[m]));
-            let mut strain = [0.0; 6];
-            for (product, error) in products.zip(&errors) {
-                (0..6).for_each(|i| strain[i] += product * error[i]);
-            }
-            let at = element::interpolate(&x, l);
-            sum += weight * first.measure * dot(&self.stress(index, at, &strain), &strain);
-        }
-        sum
-    }
-
-    /// Return the strain of the recovered minus the discrete displacement in a linear cell, as coefficients of the
-    /// products l_k l_m with k <= m. The gradient of a parabola is linear, the blending weights are linear in linear
-    /// elements, and all products sum to one.
-    fn strain_errors(&self, cell: &[u32], discrete: &Slope<D>) -> Vec<[f64; 6]> {
-        let error = |k: usize, m: usize| {
-            let mut slope = Slope { h: self.jet(cell[k], &self.space.nodes[cell[m] as usize]).1, hoop: 0.0 };
-            slope.add(-1.0, discrete);
-            slope
-        };
-        let mut errors = Vec::new();
-        for k in 0..=D {
-            for m in k..=D {
-                let mut slope = error(k, m);
-                if m > k {
-                    slope.add(1.0, &error(m, k));
-                }
-                errors.push(slope.strain());
-            }
-        }
-        errors
     }
 
     /// Return the gradient of the recovered displacement at a point with barycentric coordinates `l` of a cell or facet
