@@ -94,8 +94,7 @@ impl Law {
         }
     }
 
-    /// Return whether the layer pulls where it is stretched, at c < 0. Such a law has no state without pressure but c =
-    /// 0.
+    /// Return whether the layer pulls where it is stretched, at c < 0. Such a law has one state without pressure, c = 0.
     pub fn is_bonded(&self) -> bool {
         self.tension.is_some()
     }
@@ -138,8 +137,8 @@ impl Law {
         }
     }
 
-    /// Return g'(-c) of (38), the tangent of the paper's law g, which continues into tension as an odd function. For c
-    /// > 0 it is p'(c). The Robin terms of open points use it, the pressure never does.
+    /// Return g'(-c) of (38), the tangent of the paper's law g, which continues into tension as an odd function. Where
+    /// the layer is compressed, it is p'(c). The Robin terms of open points use it, the pressure never does.
     pub fn robin_tangent(&self, point: usize, c: f64) -> f64 {
         self.pressure_and_tangent(point, if self.is_bonded() { c } else { c.abs() }).1
     }
