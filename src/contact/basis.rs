@@ -9,9 +9,9 @@ use crate::linalg::DisjointSets;
 use crate::problem::order::Order;
 use nalgebra::{DMatrix, DVector};
 
-/// The functions mu_i of the nodes of one facet of side a, and the functions that interpolate values at these nodes. Both
-/// are combinations of the shape functions phi, mu = C phi and E phi. A node that carries no pressure has a zero row in
-/// both.
+/// The functions mu_i of the nodes of one facet of side a, and the functions that interpolate values at these nodes.
+/// Both are combinations of the shape functions phi, mu = C phi and E phi. A node that carries no pressure has a zero
+/// row in both.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PressureBasis {
     order: Order,
@@ -94,9 +94,9 @@ impl PressureBasis {
         Self { order: Order::P2, part: None, functions, interpolation, is_averaged: false }
     }
 
-    /// Return the dual basis of the covered part: C = diag(int phi) M^-1 with the mass matrix M, for the shape functions
-    /// of this part on edges of order three or more, or of order two with a node on the axis; `None` where M is
-    /// singular.
+    /// Return the dual basis of the covered part: C = diag(int phi) M^-1 with the mass matrix M, for the shape
+    /// functions of this part on edges of order three or more, or of order two with a node on the axis; `None` where M
+    /// is singular.
     fn dual<const D: usize>(
         order: Order,
         axis: Option<usize>,

@@ -227,8 +227,8 @@ impl Rule {
 }
 
 /// Return the rule for products of two functions of an order where the measure or a factor varies, as on curved
-/// simplices: of degree 2k + 1, and of degree 2 for linear functions, whose simplices are straight. Other functions than
-/// polynomials take at least the rule for order 2.
+/// simplices: of degree 2k + 1, and of degree 2 for linear functions, whose simplices are straight. Other functions
+/// than polynomials take at least the rule for order 2.
 pub fn rule_of_products(vertices: usize, order: Order) -> Rule {
     rule(vertices, if order == Order::P1 { 2 } else { 2 * order.degree() + 1 })
 }

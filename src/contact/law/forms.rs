@@ -96,8 +96,8 @@ impl Power {
 
     /// Return the compression c > 0 with c + p/rho = s for s > 0 and a finite rho, if it has a closed form.
     ///
-    /// That of a line puts a linear layer in full contact on its law without rounding. That of a parabola is there since
-    /// the search takes a tenth of the time of `blocks` with 1000 blocks.
+    /// That of a line puts a linear layer in full contact on its law without rounding. That of a parabola is there
+    /// since the search takes a tenth of the time of `blocks` with 1000 blocks.
     pub(super) fn resolvent(&self, s: f64, rho: f64) -> Option<f64> {
         let Self { k, exponent } = *self;
         if exponent == 1.0 {

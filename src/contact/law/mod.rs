@@ -94,7 +94,8 @@ impl Law {
         }
     }
 
-    /// Return whether the layer pulls where it is stretched, at c < 0. Such a law has one state without pressure, c = 0.
+    /// Return whether the layer pulls where it is stretched, at c < 0. Such a law has one state without pressure, at
+    /// the origin.
     pub fn is_bonded(&self) -> bool {
         self.tension.is_some()
     }
@@ -221,18 +222,19 @@ impl Law {
     /// `mu` is an energy per area and `rho > 0` a stiffness per area. With `mu` = 0 the result is the state on the law
     /// itself.
     ///
-    /// Let c = phi(p) be the inverse of the law. The smoothed law, as on the central path of an interior-point method, is
+    /// Let c = phi(p) be the inverse of the law. The smoothed law, as on the central path of an interior-point method,
+    /// is
     ///
     /// ```text
     /// c = phi(p) - mu/p,   p > 0,        kappa = dp/dc = 1 / (phi'(p) + mu/p^2)
     /// ```
     ///
-    /// It is strictly monotone and has no corner. At every pressure p the gap s = mu/p remains, so that s p = mu, which is
-    /// the perturbed complementarity condition.
+    /// It is strictly monotone and has no corner. At every pressure p the gap s = mu/p remains, so that s p = mu, which
+    /// is the perturbed complementarity condition.
     ///
     /// The law need not be inverted. Let P(s) be the pressure at which the law itself meets the line with the sum s. A
-    /// state with the remaining gap y = mu/p has p = P(`sum` + y), so y is the root of y P(`sum` + y) = mu, where the left
-    /// side increases with y. The root is least for a rigid layer, P(s) = rho s, whose gap has a closed form.
+    /// state with the remaining gap y = mu/p has p = P(`sum` + y), so y is the root of y P(`sum` + y) = mu, where the
+    /// left side increases with y. The root is least for a rigid layer, P(s) = rho s, whose gap has a closed form.
     ///
     /// A bonded layer neither opens nor closes, so that nothing is smoothed.
     pub fn resolve(&self, point: usize, sum: f64, rho: f64, mu: f64) -> LawState {

@@ -219,8 +219,8 @@ impl<const D: usize> BoxTree<D> {
         self.tree.locate_in_envelope_intersecting(near).map(|candidate| candidate.data)
     }
 
-    /// Return the pieces of a facet of side a that `facing` makes of facets of side b, and note in `cover` why others are
-    /// none.
+    /// Return the pieces of a facet of side a that `facing` makes of facets of side b, and note in `cover` why others
+    /// are none.
     ///
     /// Facets that normals meet within twice the distance of the nearest one and the size of the facet are tried first,
     /// so that tilted surfaces are found, too. If none of them is a partner, those at any distance are. Where a partner
