@@ -1,7 +1,7 @@
 //! The pressure functions mu_q on one facet: which of its nodes carry a pressure, and how means around them are
 //! weighted.
 
-use super::pieces::IntegrationPoint;
+use super::point::IntegrationPoint;
 use super::side::Side;
 use crate::fem::element::{self, EDGES, Values};
 use crate::fem::{Facets, lagrange};

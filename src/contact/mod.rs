@@ -10,6 +10,7 @@ mod mirror;
 mod normal;
 mod pair;
 pub mod pieces;
+mod point;
 mod review;
 mod side;
 

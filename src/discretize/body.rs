@@ -77,7 +77,7 @@ impl<const D: usize> BodyMesh<D> {
 
     /// Return the displacements of the dofs of a node in a rigid motion.
     pub fn at_dofs(&self, motion: &RigidMotion<D>, node: u32) -> [f64; D] {
-        self.held.frame.dofs(node, motion, |node| self.space.nodes[node as usize])
+        self.held.frame.dofs(node, |node| self.at(motion, node), motion.rotation())
     }
 
     /// Return the displacement of a dof in a rigid motion.

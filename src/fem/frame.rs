@@ -18,7 +18,7 @@
 //! constraint. In v every support is a prescribed dof, and the blocks of K keep their size. Dofs of a displacement are
 //! asked for rigid motions alone, whose rotation is known, so that no inverse of T is needed.
 
-use super::{RigidMotion, cross, length, minus, pad};
+use super::{cross, length, minus, pad};
 use crate::exchange::Plain;
 use crate::linalg::dot;
 use nalgebra::{SMatrix, SVector};
@@ -162,16 +162,15 @@ impl<const D: usize> Frame<D> {
         u
     }
 
-    /// Return the values at the dofs of a node in a rigid motion. `x` gives the place of a node.
-    pub fn dofs(&self, node: u32, motion: &RigidMotion<D>, x: impl Fn(u32) -> [f64; D]) -> [f64; D] {
-        let at = |node: u32| motion.at(&x(node));
+    /// Return the values at the dofs of a node in a rigid motion with the displacements `u` and this rotation vector.
+    pub fn dofs(&self, node: u32, u: impl Fn(u32) -> [f64; D], rotation: [f64; 3]) -> [f64; D] {
         if let Some(size) = self.poles.get(&node) {
-            return std::array::from_fn(|k| size * dot(&motion.rotation(), &axis::<D>(k)));
+            return std::array::from_fn(|k| size * dot(&rotation, &axis::<D>(k)));
         }
         match self.row(node) {
-            [] => at(node),
-            [(own, turned)] if *own == node => turned.tr_mul(&SVector::from(at(node))).into(),
-            [(master, _)] => minus(at(node), at(*master)),
+            [] => u(node),
+            [(own, turned)] if *own == node => turned.tr_mul(&SVector::from(u(node))).into(),
+            [(master, _)] => minus(u(node), u(*master)),
             // a surface that turns follows any rigid motion
             _ => [0.0; D],
         }

@@ -73,7 +73,9 @@ fn work<const D: usize>(moment: [f64; 3]) {
     let motions: Vec<RigidMotion<D>> = rigid::modes(&PointExtent::of(space.nodes.iter().copied()));
     for motion in &motions {
         let u = motion.nodal(space.nodes.iter().copied());
-        let v: Vec<f64> = (0..space.nodes.len() as u32).flat_map(|node| frame.dofs(node, motion, x)).collect();
+        let v: Vec<f64> = (0..space.nodes.len() as u32)
+            .flat_map(|node| frame.dofs(node, |node| motion.at(&x(node)), motion.rotation()))
+            .collect();
         let mut tied = frame.tied().filter(|node| *node != pole);
         assert!(tied.all(|node| v[D * node as usize..][..D] == [0.0; D]));
         frame.displacements(&v).iter().zip(&u).for_each(|(a, b)| near(*a, *b));
