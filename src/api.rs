@@ -37,7 +37,7 @@
 //! # Ok::<(), winkler::api::Error>(())
 //! ```
 
-pub use crate::contact::law::{LayerLaw, PerPoint, Response};
+pub use crate::contact::law::{LayerLaw, PerPoint, Power};
 pub use crate::data::{Data, DataSpec, Detrend, Interpolation, Library, Outside};
 pub use crate::ddm::gamma::{GammaRule, Iterate};
 pub use crate::ddm::{Observer, Row, Silent, Status};

@@ -280,7 +280,6 @@ impl LocalErrors {
         (index, rigid): (usize, &[f64]),
     ) {
         let (pair, points, range) = (&model.pairs[index], meshes.points(index), model.range(index));
-        let soft = pressure::softness(model, index);
         let mut compression = vec![0.0; points.each.len()];
         for side in 0..2 {
             if let Some(recovered) = &recovered[pair.bodies[side]] {
@@ -299,7 +298,7 @@ impl LocalErrors {
         model.exchange.sum(&mut mean_error);
         let springs: Vec<f64> =
             range.clone().zip(&mean_error).map(|(q, c)| model.area[q] * layer.tangent[q] * c).collect();
-        let of_layer = LayerError::new(pair, points, soft, layer, range.clone(), &compression, &mean_error);
+        let of_layer = LayerError::new(model, points, layer, index, &compression, &mean_error);
         let force: Vec<f64> = of_layer.pressure.iter().zip(&points.each).map(|(p, point)| -point.weight * p).collect();
         for side in 0..2 {
             let (body, nodal) = (pair.bodies[side], &pair.nodal[side]);

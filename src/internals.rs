@@ -5,7 +5,7 @@ pub use crate::linalg::bounds;
 
 pub mod contact {
     //! Contact points and laws of layers.
-    pub use crate::contact::{Carriers, ContactPair, Side, assemble, law, pieces};
+    pub use crate::contact::{ContactPair, PressureBasis, Side, assemble, law, pieces};
 }
 
 pub mod ddm {

@@ -5,9 +5,7 @@
 //! cargo run --release --example law
 //! ```
 
-use winkler::api::{
-    BodySpec, ContactSpec, LayerLaw, LayerSpec, MeshArrays, Response, Result, Scene, Session, Solution, solve,
-};
+use winkler::api::{BodySpec, ContactSpec, LayerLaw, LayerSpec, MeshArrays, Result, Scene, Session, Solution, solve};
 
 const YOUNG: f64 = 100.0;
 /// The pressure on the upper block.
@@ -21,12 +19,16 @@ struct Film {
 }
 
 impl LayerLaw for Film {
-    fn compressed(&self, _point: usize, c: f64) -> Response {
+    fn pressure_and_tangent(&self, _point: usize, c: f64) -> (f64, f64) {
         let Film { stiffness: k, thickness: h } = *self;
         // all is infinite from c = h on: a rigid stop
         let left = (1.0 - c / h).max(0.0);
-        let energy = -k * h * (h * (-c / h).max(-1.0).ln_1p() + c);
-        Response { pressure: k * c / left, tangent: k / left.powi(2), energy }
+        (k * c / left, k / left.powi(2))
+    }
+
+    fn energy(&self, _point: usize, c: f64) -> f64 {
+        let Film { stiffness: k, thickness: h } = *self;
+        -k * h * (h * (-c / h).max(-1.0).ln_1p() + c)
     }
 }
 

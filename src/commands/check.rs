@@ -77,7 +77,7 @@ fn pair_to_json(built: &Built, i: usize) -> Value {
         "length": pair.area.iter().sum::<f64>(),
         "gap": [low, high],
         "facets_uncovered": pair.uncovered(),
-        "pieces_lost": pair.lost.map_or(0, |lost| lost.pieces),
+        "pieces_lost": pair.pieces_lost(),
         "facets_averaged": pair.averaged(),
     })
 }

@@ -1,99 +1,29 @@
 //! The pressure functions mu_q on one facet: which of its nodes carry a pressure, and how means around them are
 //! weighted.
 
-use super::pieces::IntegrationPoint;
+use super::point::IntegrationPoint;
+use super::side::Side;
 use crate::fem::element::{self, EDGES, Values};
 use crate::fem::{Facets, lagrange};
 use crate::linalg::DisjointSets;
 use crate::problem::order::Order;
-use nalgebra::DMatrix;
-use serde::{Deserialize, Serialize};
+use nalgebra::{DMatrix, DVector};
 
-/// The nodes of a facet that carry a pressure.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub enum Carriers {
-    /// All nodes.
-    Nodes,
-    /// The vertices of a quadratic facet.
-    Vertices,
-    /// The mid-edges of a quadratic triangle.
-    MidEdges,
-    /// Nodes of an edge of order three or more, or of order two on an axis of revolution, moved to the covered part of
-    /// it.
-    Part(Part),
-}
-
-/// The covered part of an edge, with points at its Gauss-Lobatto points.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Part {
-    /// Its ends, of 0 to 1 along the edge.
-    ends: [f64; 2],
-    /// Local node on the axis of revolution, which carries no point.
-    without: Option<usize>,
-}
-
-impl Carriers {
-    /// Return the functions that interpolate values at the carriers, at barycentric point `l` of the facet, one entry a
-    /// local node. Nodes that carry nothing have zero. Between mid-edges the interpolation is linear on each facet.
-    pub fn interpolation<const D: usize>(self, order: Order, l: &[f64; D]) -> Values {
-        match self {
-            Self::Nodes => element::values(order, l),
-            Self::Part(part) => {
-                let mut shape = part.values(order, l);
-                if let Some(without) = part.without {
-                    // the polynomial of one degree less through the other nodes
-                    let highest = lagrange::of(order, D).highest();
-                    let on_axis = std::mem::take(&mut shape[without]);
-                    let others = shape.iter_mut().zip(&highest).enumerate().filter(|(i, _)| *i != without);
-                    others.for_each(|(_, (shape, c))| *shape -= on_axis * c / highest[without]);
-                }
-                shape
-            }
-            Self::Vertices => element::values(Order::P1, l),
-            Self::MidEdges => (0..D).map(|_| 0.0).chain((0..D).map(|edge| 1.0 - 2.0 * l[opposite(edge)])).collect(),
-        }
-    }
-}
-
-impl Part {
-    /// Return the part of an edge that these integration points cover: from the first to the last piece, which reach
-    /// beyond their outer Gauss points.
-    fn covered<const D: usize>(chunk: &[IntegrationPoint<D>]) -> Self {
-        let mut ends = [1.0f64, 0.0f64];
-        for piece in chunk.chunk_by(|p, q| p.facet_b == q.facet_b) {
-            let (first, last) = (piece[0].at_a[1], piece[piece.len() - 1].at_a[1]);
-            let margin = lagrange::gauss(piece.len())[0].0;
-            let beyond = if piece.len() > 1 { margin / (1.0 - 2.0 * margin) * (last - first) } else { 0.0 };
-            ends = [ends[0].min(first - beyond), ends[1].max(last + beyond)];
-        }
-        // an end at a vertex has the point of the vertex
-        let ends = ends.map(|end| if (end - end.round()).abs() <= ROUNDING { end.round() } else { end });
-        Self { ends, without: None }
-    }
-
-    /// Return the values of the shape functions of the part at a point of the edge.
-    fn values<const D: usize>(&self, order: Order, l: &[f64; D]) -> Values {
-        let along = (l[1] - self.ends[0]) / (self.ends[1] - self.ends[0]);
-        element::values(order, &[1.0 - along, along])
-    }
-}
-
-/// Return the vertex of a triangle that edge `edge` does not touch.
-fn opposite(edge: usize) -> usize {
-    3 - EDGES[edge].0 - EDGES[edge].1
-}
-
-/// The functions mu_i on the covered part of one facet of side a.
-pub(super) enum PressureBasis {
-    /// The dual basis mu = C phi of the covered part, with one function for each node and the shape functions phi.
-    Dual(DMatrix<f64>),
-    /// The same on an edge with the shape functions of the covered part. The function of a node on the axis of
-    /// revolution is zero.
-    Part(DMatrix<f64>, Part),
-    /// Hat functions: the barycentric coordinate mu_i = l_i at vertex i, zero at mid-edges.
-    Hats,
-    /// The dual basis of the whole flat triangle at the mid-edges, zero at the vertices.
-    MidEdges,
+/// The functions mu_i of the nodes of one facet of side a, and the functions that interpolate values at these nodes.
+/// Both are combinations of the shape functions phi, mu = C phi and E phi. A node that carries no pressure has a zero
+/// row in both.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PressureBasis {
+    order: Order,
+    /// Ends of the part of an edge, from 0 to 1 along it, of which phi are the shape functions; else those of the whole
+    /// facet.
+    part: Option<[f64; 2]>,
+    /// C.
+    functions: DMatrix<f64>,
+    /// E.
+    interpolation: DMatrix<f64>,
+    /// Whether the functions are the hat functions of the vertices.
+    pub is_averaged: bool,
 }
 
 /// Largest ratio int |mu| / int mu of a steady mean.
@@ -112,108 +42,136 @@ const STEADY: f64 = 5.0;
 const ROUNDING: f64 = 1e-6;
 
 impl PressureBasis {
-    /// Choose the basis on facet `chunk[0].facet_a`, a simplex of `order` with `count` nodes. `chunk` holds the
-    /// integration points of the part that the facets `b` of side b cover, and `axis` is the local node on the axis of
-    /// revolution.
+    /// Choose the basis for functions of `order` on facet `chunk[0].facet_a` of side a. `chunk` holds the integration
+    /// points of the part that the facets of side b cover, and `ends` are the ends of this part on an edge.
     ///
-    /// On an edge of order two or more this node carries no point. On a straight edge int r phi is zero there, and on a
-    /// curved edge it has either sign: it is distributed over the other nodes, so that their weights integrate
-    /// polynomials of one degree less than the elements as before.
+    /// On an edge of order two or more a node on the axis of revolution carries no point. On a straight edge int r phi
+    /// is zero there, and on a curved edge it has either sign: it is distributed over the other nodes, so that their
+    /// weights integrate polynomials of one degree less than the elements as before.
     ///
-    /// Where these facets are apart, the distance jumps, and a dual mean would be beyond the distances on both sides of
-    /// the jump: an overlap where there is none.
+    /// Where the facets of side b are apart, the distance jumps, and a dual mean would be beyond the distances on both
+    /// sides of the jump: an overlap where there is none.
     pub fn on<const D: usize>(
         order: Order,
-        count: usize,
-        chunk: &[IntegrationPoint<D>],
+        a: &Side<D>,
         b: &Facets<D>,
-        axis: Option<usize>,
+        ends: [f64; 2],
+        chunk: &[IntegrationPoint<D>],
     ) -> Self {
-        if are_apart(b, chunk) {
-            return Self::Hats;
-        }
-        if order == Order::P2 && D == 3 {
-            return Self::MidEdges.or_hats(order, &(D..2 * D).collect::<Vec<_>>(), chunk);
-        }
-        let of_parts = order > Order::P2 || order == Order::P2 && axis.is_some();
-        let mut part = (D == 2 && of_parts).then(|| Part::covered(chunk));
-        if part.is_some_and(|part| part.ends[1] - part.ends[0] <= ROUNDING) {
-            return Self::Hats;
-        }
-        let mut mass = DMatrix::zeros(count, count);
-        let mut integral = vec![0.0; count];
-        for point in chunk {
-            let phi = part.map_or_else(|| element::values(order, &point.at_a), |part| part.values(order, &point.at_a));
-            for i in 0..count {
-                integral[i] += point.weight * phi[i];
-                for j in 0..count {
-                    mass[(i, j)] += point.weight * phi[i] * phi[j];
-                }
-            }
-        }
-        let Some(factor) = mass.cholesky() else { return Self::Hats };
-        let mut dual = factor.inverse();
-        // a part that ends before the axis has all of its points
-        let on_axis = axis.filter(|&i| part.is_some_and(|part| part.ends[i] == i as f64));
-        if let Some(axis) = on_axis {
-            let (highest, on_axis) = (lagrange::of(order, D).highest(), std::mem::take(&mut integral[axis]));
-            let others = (0..count).filter(|&i| i != axis);
-            others.for_each(|i| integral[i] -= on_axis * highest[i] / highest[axis]);
-        }
-        dual.row_iter_mut().zip(&integral).for_each(|(mut row, integral)| row *= *integral);
-        let carriers: Vec<usize> = (0..count).filter(|i| on_axis != Some(*i)).collect();
-        part.iter_mut().for_each(|part| part.without = on_axis);
-        let basis = match part {
-            Some(part) => Self::Part(dual, part),
-            None => Self::Dual(dual),
+        let dual = if are_apart(b, chunk) {
+            None
+        } else if order == Order::P2 && D == 3 {
+            Some(Self::mid_edges())
+        } else {
+            Self::dual(order, a.axis_of(chunk[0].facet_a), ends, chunk)
         };
-        basis.or_hats(order, &carriers, chunk)
+        dual.filter(|basis| basis.is_steady(chunk)).unwrap_or_else(|| Self::hats::<D>(order))
     }
 
-    /// Return this basis if the functions of these nodes have steady means on the covered part, otherwise the hat
-    /// functions.
-    fn or_hats<const D: usize>(self, order: Order, nodes: &[usize], chunk: &[IntegrationPoint<D>]) -> Self {
-        let [mut integral, mut size] = [(); 2].map(|()| vec![0.0; element::node_count(D, order)]);
+    /// Return the hat functions: the barycentric coordinate mu_i = l_i at vertex i.
+    fn hats<const D: usize>(order: Order) -> Self {
+        let nodes = element::nodes::<D>(order);
+        let hats = DMatrix::from_fn(nodes.len(), nodes.len(), |i, j| if i < D { nodes[j][i] } else { 0.0 });
+        Self { order, part: None, functions: hats.clone(), interpolation: hats, is_averaged: true }
+    }
+
+    /// Return the functions diag(int phi) M^-1 phi of a flat quadratic triangle with mass matrix M, and the
+    /// interpolation between its mid-edges, which is linear. The functions of the vertices vanish, since int phi is
+    /// zero there. Those of the three mid-edges therefore sum to one.
+    fn mid_edges() -> Self {
+        let nodes = element::nodes::<3>(Order::P2);
+        let of_edges = |at: &dyn Fn(usize, usize) -> f64| {
+            DMatrix::from_fn(6, 6, |i, j| if i < 3 { 0.0 } else { at(3 - EDGES[i - 3].0 - EDGES[i - 3].1, j) })
+        };
+        // `opposite` is the vertex that the edge does not touch
+        let functions = of_edges(&|opposite, j| match nodes[j][opposite] {
+            1.0 => 2.0,
+            0.0 if j >= 3 => 3.25,
+            0.0 => -0.5,
+            _ => -1.125,
+        });
+        let interpolation = of_edges(&|opposite, j| 1.0 - 2.0 * nodes[j][opposite]);
+        Self { order: Order::P2, part: None, functions, interpolation, is_averaged: false }
+    }
+
+    /// Return the dual basis of the covered part: C = diag(int phi) M^-1 with the mass matrix M, for the shape
+    /// functions of this part on edges of order three or more, or of order two with a node on the axis; `None` where M
+    /// is singular.
+    fn dual<const D: usize>(
+        order: Order,
+        axis: Option<usize>,
+        ends: [f64; 2],
+        chunk: &[IntegrationPoint<D>],
+    ) -> Option<Self> {
+        let count = element::node_count(D, order);
+        let of_parts = D == 2 && (order > Order::P2 || order == Order::P2 && axis.is_some());
+        // an end at a vertex has the point of the vertex
+        let ends = ends.map(|end| if (end - end.round()).abs() <= ROUNDING { end.round() } else { end });
+        if of_parts && ends[1] - ends[0] <= ROUNDING {
+            return None;
+        }
+        let identity = DMatrix::identity(count, count);
+        let part = of_parts.then_some(ends);
+        let mut basis = Self { order, part, functions: identity.clone(), interpolation: identity, is_averaged: false };
+        let (mut mass, mut integral) = (DMatrix::zeros(count, count), DVector::zeros(count));
         for point in chunk {
-            let phi = self.shapes(order, &point.at_a);
-            for &i in nodes {
-                let mu = point.weight * self.value(i, &phi, &point.at_a);
-                integral[i] += mu;
-                size[i] += mu.abs();
-            }
+            let phi = DVector::from_column_slice(&basis.shapes(&point.at_a));
+            integral.axpy(point.weight, &phi, 1.0);
+            mass.ger(point.weight, &phi, &phi, 1.0);
+        }
+        basis.functions = mass.cholesky()?.inverse();
+        // a part that ends before the axis has all of its points
+        if let Some(axis) = axis.filter(|&i| of_parts && ends[i] == i as f64) {
+            // the polynomial of one degree less through the other nodes
+            let highest = lagrange::of(order, D).highest();
+            let shares = DVector::from_fn(count, |i, _| highest[i] / highest[axis]);
+            integral.axpy(-integral[axis], &shares, 1.0);
+            basis.interpolation.column_mut(axis).axpy(-1.0, &shares, 1.0);
+        }
+        basis.functions.row_iter_mut().zip(&integral).for_each(|(mut row, integral)| row *= *integral);
+        Some(basis)
+    }
+
+    /// Return whether the functions of all nodes that carry a pressure have steady means on the covered part.
+    fn is_steady<const D: usize>(&self, chunk: &[IntegrationPoint<D>]) -> bool {
+        let count = self.functions.nrows();
+        let [mut integral, mut size] = [(); 2].map(|()| DVector::zeros(count));
+        for point in chunk {
+            let mu = point.weight * self.functions(&point.at_a);
+            size += mu.abs();
+            integral += mu;
         }
         let rounding = ROUNDING * chunk.iter().map(|point| point.weight).sum::<f64>();
-        let limit = STEADY * (order.degree() as f64 / 2.0).sqrt().max(1.0);
-        let steady = |i: &usize| integral[*i] > rounding && size[*i] <= limit * integral[*i];
-        if nodes.iter().all(steady) { self } else { Self::Hats }
+        let limit = STEADY * (self.order.degree() as f64 / 2.0).sqrt().max(1.0);
+        let steady = |i: usize| integral[i] > rounding && size[i] <= limit * integral[i];
+        (0..count).filter(|&i| self.carries(i)).all(steady)
     }
 
-    /// Return mu of local node `i` at barycentric point `l`, where `phi` are the values of the shape functions of
-    /// [`PressureBasis::shapes`].
-    pub fn value<const D: usize>(&self, i: usize, phi: &[f64], l: &[f64; D]) -> f64 {
-        match self {
-            Self::Dual(c) | Self::Part(c, _) => c.row(i).iter().zip(phi).map(|(c, phi)| c * phi).sum(),
-            Self::Hats => l.get(i).copied().unwrap_or(0.0),
-            Self::MidEdges => i.checked_sub(D).map_or(0.0, |edge| at_mid_edge(edge, phi)),
-        }
+    /// Return the values of all functions mu_i at barycentric point `l`.
+    pub fn functions<const D: usize>(&self, l: &[f64; D]) -> DVector<f64> {
+        &self.functions * DVector::from_column_slice(&self.shapes(l))
     }
 
-    /// Return the values at barycentric point `l` of the shape functions that the functions of this basis are made of.
-    pub fn shapes<const D: usize>(&self, order: Order, l: &[f64; D]) -> Values {
-        match self {
-            Self::Part(_, part) => part.values(order, l),
-            _ => element::values(order, l),
-        }
+    /// Return the functions that interpolate values at the nodes, at barycentric point `l`.
+    pub fn interpolation<const D: usize>(&self, l: &[f64; D]) -> DVector<f64> {
+        &self.interpolation * DVector::from_column_slice(&self.shapes(l))
     }
 
-    /// Return the nodes whose functions this basis has.
-    pub fn carriers(&self) -> Carriers {
-        match self {
-            Self::Dual(_) => Carriers::Nodes,
-            Self::Part(_, part) => Carriers::Part(*part),
-            Self::Hats => Carriers::Vertices,
-            Self::MidEdges => Carriers::MidEdges,
-        }
+    /// Return whether a local node carries a pressure.
+    pub fn carries(&self, node: usize) -> bool {
+        self.interpolation[(node, node)] != 0.0
+    }
+
+    /// Return whether the functions are those of the covered part of an edge, whose degree is that of the elements.
+    pub fn is_of_part(&self) -> bool {
+        self.part.is_some()
+    }
+
+    /// Return the values of phi at barycentric point `l`.
+    fn shapes<const D: usize>(&self, l: &[f64; D]) -> Values {
+        let Some([from, to]) = self.part else { return element::values(self.order, l) };
+        let along = (l[1] - from) / (to - from);
+        element::values(self.order, &[1.0 - along, along])
     }
 }
 
@@ -232,15 +190,6 @@ fn are_apart<const D: usize>(b: &Facets<D>, chunk: &[IntegrationPoint<D>]) -> bo
     joined.classes().0 > 1
 }
 
-/// Return the function diag(int phi) M^-1 phi of a flat quadratic triangle for mid-edge `edge`, from the values `phi`
-/// of the shape functions with mass matrix M. The functions of the vertices vanish, since int phi is zero there. Those
-/// of the three mid-edges therefore sum to one.
-fn at_mid_edge(edge: usize, phi: &[f64]) -> f64 {
-    let vertices = -0.5 * (phi[0] + phi[1] + phi[2]) + 2.5 * phi[opposite(edge)];
-    let edges = -1.125 * (phi[3] + phi[4] + phi[5]) + 4.375 * phi[3 + edge];
-    vertices + edges
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -248,37 +197,43 @@ mod tests {
     /// int mu_e phi_j = A/3 if j is the mid-edge e, and zero for the five other nodes; the three functions sum to one.
     #[test]
     fn functions_of_mid_edges_are_dual_and_sum_to_one() {
-        let rule = element::rule(3, 5);
-        let mut pairing = [[0.0; 6]; 3];
-        for (l, weight) in rule.iter() {
-            let phi = element::values(Order::P2, l);
-            let mu: [f64; 3] = std::array::from_fn(|edge| at_mid_edge(edge, &phi));
-            assert!((mu.iter().sum::<f64>() - 1.0).abs() < 1e-13, "{mu:?}");
-            for edge in 0..3 {
-                (0..6).for_each(|j| pairing[edge][j] += weight * mu[edge] * phi[j]);
-            }
+        let basis = PressureBasis::mid_edges();
+        let mut pairing = DMatrix::zeros(6, 6);
+        for (l, weight) in element::rule(3, 5).iter() {
+            let l = [l[0], l[1], l[2]];
+            let mu = basis.functions(&l);
+            assert!((mu.sum() - 1.0).abs() < 1e-13, "{mu:?}");
+            pairing.ger(weight, &mu, &DVector::from_column_slice(&element::values(Order::P2, &l)), 1.0);
         }
-        for edge in 0..3 {
-            for j in 0..6 {
-                let exact = if j == 3 + edge { 1.0 / 3.0 } else { 0.0 };
-                assert!((pairing[edge][j] - exact).abs() < 1e-14, "{edge} {j}: {}", pairing[edge][j]);
-            }
-        }
+        let exact = DMatrix::from_fn(6, 6, |i, j| if i == j && i >= 3 { 1.0 / 3.0 } else { 0.0 });
+        assert!((&pairing - exact).abs().max() < 1e-14, "{pairing}");
     }
 
-    /// All carriers interpolate linear functions exactly, and all nodes together quadratic ones.
+    /// All nodes interpolate linear functions exactly, and all nodes of a dual basis quadratic ones. On an edge with a
+    /// node on the axis, which carries nothing, it is linear functions.
     #[test]
-    fn interpolation_between_carriers() {
-        let l = [0.2, 0.7, 0.1];
-        let of_places = |f: &dyn Fn(&[f64; 3]) -> f64| element::nodes::<3>(Order::P2).iter().map(f).collect::<Vec<_>>();
-        let at = |carriers: Carriers, values: &[f64]| -> f64 {
-            carriers.interpolation(Order::P2, &l).iter().zip(values).map(|(shape, value)| shape * value).sum()
-        };
+    fn interpolation_between_nodes() {
+        const L: [f64; 3] = [0.2, 0.7, 0.1];
         let linear = |l: &[f64; 3]| 3.0 * l[0] - 2.0 * l[1] + 0.5 * l[2];
-        for carriers in [Carriers::Nodes, Carriers::Vertices, Carriers::MidEdges] {
-            assert!((at(carriers, &of_places(&linear)) - linear(&l)).abs() < 1e-14, "{carriers:?}");
+        for (basis, carried) in [(PressureBasis::hats::<3>(Order::P2), 0..3), (PressureBasis::mid_edges(), 3..6)] {
+            let nodes = element::nodes::<3>(Order::P2);
+            let sum: f64 = basis.interpolation(&L).iter().zip(&nodes).map(|(shape, l)| shape * linear(l)).sum();
+            assert!((sum - linear(&L)).abs() < 1e-14, "{basis:?}");
+            assert!((0..6).all(|i| basis.carries(i) == carried.contains(&i)), "{basis:?}");
         }
-        let quadratic = |l: &[f64; 3]| l[0] * l[1] - 2.0 * l[2] * l[2];
-        assert!((at(Carriers::Nodes, &of_places(&quadratic)) - quadratic(&l)).abs() < 1e-14);
+        // the weight of a ring about the axis at node 0
+        let point = |(l, weight): (&[f64], f64)| {
+            let at = [l[0], l[1]];
+            IntegrationPoint { facet_a: 0, at_a: at, facet_b: 0, at_b: at, weight: weight * l[1], gap: 0.0 }
+        };
+        let chunk: Vec<IntegrationPoint<2>> = element::rule(2, 5).iter().map(point).collect();
+        let quadratic = |s: f64| s * (1.0 - 3.0 * s);
+        for (axis, f) in [(None, &quadratic as &dyn Fn(f64) -> f64), (Some(0), &|s| 2.0 - 3.0 * s)] {
+            let basis = PressureBasis::dual(Order::P2, axis, [0.0, 1.0], &chunk).expect("a basis");
+            let values: Vec<f64> = element::nodes::<2>(Order::P2).iter().map(|l| f(l[1])).collect();
+            assert_eq!(basis.carries(0), axis.is_none());
+            let sum: f64 = basis.interpolation(&[0.7, 0.3]).iter().zip(&values).map(|(e, value)| e * value).sum();
+            assert!((sum - f(0.3)).abs() < 1e-14, "{basis:?}");
+        }
     }
 }

@@ -3,13 +3,13 @@
 //! At these points the compression of the layer and the gap are those of the points themselves, not means around the
 //! nodes. Contact points are also projected to side b, and facets at rims of the contact are marked.
 
-use super::basis::{Carriers, PressureBasis};
-use super::pair::{ContactPair, Coverage};
-use super::pieces::{IntegrationPoint, Intersection};
+use super::basis::PressureBasis;
+use super::pair::ContactPair;
+use super::pieces::{Coverage, IntegrationPoint, Intersection};
 use super::review::{products, rises};
 use super::side::{FaceNode, Side};
 use crate::exchange::Plain;
-use crate::fem::{Facets, element, lagrange, length, minus, unit};
+use crate::fem::{Facets, lagrange, length, minus, unit};
 use crate::linalg::{Csr, dot};
 use crate::problem::order::Order;
 use nalgebra::{DMatrix, DVector};
@@ -115,6 +115,10 @@ impl<const D: usize> Fine<D> {
         let at_rim = facets_at_rim(a, b, common, &pair.cover, jumps);
         let normal_a = |point: &IntegrationPoint<D>| vector_at(a, point.facet_a, &point.at_a, |at| at.normal);
         let direction = |point: &IntegrationPoint<D>| vector_at(a, point.facet_a, &point.at_a, |at| at.direction);
+        let degree = |cover: &Coverage| {
+            let shows_all = cover.basis.as_ref().is_some_and(PressureBasis::is_of_part) || D == 2 && cover.is_whole();
+            if shows_all { a.facets.order.degree() } else { 1 }
+        };
         let of_point = |point: &IntegrationPoint<D>| FinePoint {
             weight: point.weight * dot(&normal_a(point), &direction(point)),
             gap: gap_at(a, point, rounding, gap) - rise_of_both(point),
@@ -122,12 +126,8 @@ impl<const D: usize> Fine<D> {
             along: point.at_a[0],
             size: size_under(a, point),
             at_rim: at_rim[point.facet_a],
-            at_edges: pair.cover[point.facet_a].carriers == Some(Carriers::MidEdges),
-            degree: match pair.cover[point.facet_a].carriers {
-                Some(Carriers::Part(_)) => a.facets.order.degree(),
-                _ if D == 2 && pair.cover[point.facet_a].is_whole() => a.facets.order.degree(),
-                _ => 1,
-            },
+            at_edges: D == 3 && pair.cover[point.facet_a].basis.as_ref().is_some_and(|basis| !basis.carries(0)),
+            degree: degree(&pair.cover[point.facet_a]),
             nearest: 0,
         };
         let mut points = FinePoints {
@@ -137,7 +137,7 @@ impl<const D: usize> Fine<D> {
             pressing: Csr::new(pair.len()),
             kinks: kinks(a, &pair.cover, gap),
         };
-        points.push_rows(a, b, shared, pair);
+        points.push_rows(a, shared, pair);
         Self {
             points,
             normal: shared.iter().map(direction).collect(),
@@ -164,30 +164,22 @@ impl FinePoints {
     }
 
     /// Append the rows of the points, facet by facet of side a, and find the contact point nearest to each.
-    fn push_rows<const D: usize>(
-        &mut self,
-        a: &Side<D>,
-        b: &Side<D>,
-        shared: &[IntegrationPoint<D>],
-        pair: &ContactPair,
-    ) {
+    fn push_rows<const D: usize>(&mut self, a: &Side<D>, shared: &[IntegrationPoint<D>], pair: &ContactPair) {
         let point_of = pair.point_of(a.nodes.len());
         let mut each = self.each.iter_mut();
         for chunk in shared.chunk_by(|p, q| p.facet_a == q.facet_a) {
             let nodes = a.on_facet(chunk[0].facet_a);
-            let basis = PressureBasis::on(self.order, nodes.len(), chunk, &b.facets, a.axis_of(chunk[0].facet_a));
-            let row = |values: element::Values| {
-                let of_point = |(node, value): (&u32, f64)| point_of[*node as usize].map(|q| (q, value));
-                let entries = nodes.iter().zip(values).filter(|(_, value)| *value != 0.0).filter_map(of_point);
+            let Some(basis) = &pair.cover[chunk[0].facet_a].basis else { continue };
+            let row = |values: DVector<f64>| {
+                let of_point = |(node, value): (&u32, &f64)| Some((point_of[*node as usize]?, *value));
+                let entries = nodes.iter().zip(&values).filter(|(_, value)| **value != 0.0).filter_map(of_point);
                 let mut row: Vec<(usize, f64)> = entries.collect();
                 row.sort_unstable_by_key(|entry| entry.0);
                 row
             };
             for (point, fine) in chunk.iter().zip(&mut each) {
-                let shapes = basis.shapes(self.order, &point.at_a);
-                let mu = (0..nodes.len()).map(|i| basis.value(i, &shapes, &point.at_a));
-                self.pressing.push_row(row(mu.collect()));
-                let interpolation = row(basis.carriers().interpolation(self.order, &point.at_a));
+                self.pressing.push_row(row(basis.functions(&point.at_a)));
+                let interpolation = row(basis.interpolation(&point.at_a));
                 let nearest = interpolation.iter().max_by(|p, q| p.1.total_cmp(&q.1));
                 fine.nearest = nearest.map_or(0, |entry| entry.0);
                 self.interpolation.push_row(interpolation);

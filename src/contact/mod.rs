@@ -10,15 +10,14 @@ mod mirror;
 mod normal;
 mod pair;
 pub mod pieces;
+mod point;
 mod review;
 mod side;
 
-pub use basis::Carriers;
+pub use basis::PressureBasis;
 pub use fine::{Fine, FinePoint, FinePoints};
-pub use law::LayerLaw;
-#[cfg(test)]
-pub use law::Response;
 pub use mirror::Mirrors;
-pub use pair::{ContactPair, Coverage, Fault, LostPieces, Measure, add, assemble, moment_in_scene};
+pub use pair::{ContactPair, Fault, Measure, add, assemble, moment_in_scene};
+pub use pieces::Coverage;
 pub use review::{Chords, ends};
 pub use side::Side;

@@ -72,17 +72,14 @@ fn facing<const D: usize>(a: &Side<D>, b: &Side<D>, common: &Intersection<D>) ->
         // The vertices, between which directions are interpolated, need not carry points up to order two; all other
         // nodes do so by their own functions.
         let linear = if a.facets.order <= Order::P2 { D } else { 0 };
-        let [vertices, all] = [(Order::P1, D), (a.facets.order, on.len())]
-            .map(|(order, count)| PressureBasis::on(order, count, chunk, &b.facets, a.axis_of(chunk[0].facet_a)));
+        let ends = common.cover[chunk[0].facet_a].ends;
+        let [vertices, all] =
+            [Order::P1, a.facets.order].map(|order| PressureBasis::on(order, a, &b.facets, ends, chunk));
         for point in chunk {
-            let phi = element::values(a.facets.order, &point.at_a);
+            let [at_vertices, at_all] = [&vertices, &all].map(|basis| basis.functions(&point.at_a));
             let before = surface_at(b, point.facet_b, &point.at_b);
             for (i, &at) in on.iter().enumerate() {
-                let value = if i < linear {
-                    vertices.value(i, &point.at_a, &point.at_a)
-                } else {
-                    all.value(i, &phi, &point.at_a)
-                };
+                let value = if i < linear { at_vertices[i] } else { at_all[i] };
                 let (mu, sum) = (point.weight * value, &mut sums[at as usize]);
                 sum.weight += mu;
                 sum.area += point.weight;

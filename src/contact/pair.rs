@@ -1,18 +1,16 @@
 //! The arrays of a contact pair, which are all that the solution methods know of two surfaces, and how much of them is
 //! paired.
 
-use super::basis::{Carriers, PressureBasis};
-use super::law::{LawMaker, LayerLaw, LinearLaw};
-use super::pieces::{Intersection, WHOLE};
+use super::basis::PressureBasis;
+use super::law::{Law, LawMaker, Power};
+use super::pieces::{Coverage, Intersection};
 use super::side::{FaceNode, ROUNDING, Side, along};
 use crate::error::{Error, Result};
 use crate::fem::element::{self, Rule};
 use crate::fem::{Frame, Space, area_vector, cross, length, pad};
 use crate::linalg::{Csr, dot};
-use crate::problem::order::Order;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::rc::Rc;
 
 /// A discretised pair of surfaces: n contact points with one pressure each.
 ///
@@ -75,11 +73,9 @@ pub struct ContactPair {
     pub measure: Measure,
     /// Law of the layer. It does not go from rank to rank: whoever receives a pair makes its law anew.
     #[serde(skip, default = "no_law")]
-    pub law: Rc<dyn LayerLaw>,
+    pub law: Law,
     /// Coverage of each facet of side a.
     pub cover: Vec<Coverage>,
-    /// Pieces that the search for common points has lost, if any.
-    pub lost: Option<LostPieces>,
 }
 
 /// What the areas of contact points are.
@@ -106,35 +102,8 @@ impl Measure {
 }
 
 /// Return what stands for the law of a pair from another rank until it is made.
-fn no_law() -> Rc<dyn LayerLaw> {
-    Rc::new(LinearLaw { stiffness: 0.0 })
-}
-
-/// The pieces of a pair that are lost because the search for their points failed.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct LostPieces {
-    /// Number of lost pieces and lost points of pieces.
-    pub pieces: usize,
-    /// Uncovered area (length) of the facets that lost pieces, as a share of side a.
-    pub share: f64,
-    /// Middle of the facet with the largest uncovered area (x, y, z).
-    pub at: [f64; 3],
-}
-
-impl LostPieces {
-    /// Return the losses of the facets of side a with this coverage, `None` if nothing was lost.
-    fn of<const D: usize>(a: &Side<D>, coverage: &[Coverage]) -> Option<Self> {
-        let uncovered = |&(i, facet): &(usize, &Coverage)| (1.0 - facet.share) * length(a.area(i));
-        let lost = || coverage.iter().enumerate().filter(|(_, facet)| facet.lost > 0);
-        let (worst, _) = lost().max_by(|p, q| uncovered(p).total_cmp(&uncovered(q)))?;
-        let whole = a.mean_measure() * coverage.len() as f64;
-        let middle = element::interpolate(&a.facets.coordinates(worst, a.space)[..D], &[1.0 / D as f64; D]);
-        Some(Self {
-            pieces: lost().map(|(_, facet)| facet.lost).sum(),
-            share: lost().map(|facet| uncovered(&facet)).sum::<f64>() / whole,
-            at: a.space.in_scene(middle),
-        })
-    }
+fn no_law() -> Law {
+    Law::new(Power::linear(0.0))
 }
 
 /// Why a pair could not be assembled.
@@ -161,22 +130,20 @@ fn integrate<const D: usize>(
     common: &Intersection<D>,
 ) -> (BTreeMap<u32, Accumulator>, Vec<Coverage>) {
     let mut points: BTreeMap<u32, Accumulator> = BTreeMap::new();
-    let mut carriers = vec![None; a.facets.count()];
+    let mut all = common.cover.clone();
+    let order = a.facets.order;
+    let rule = element::rule_of_products(D, order);
+    (0..all.len()).for_each(|i| all[i].measure = facet_measure(a, i, &rule));
     for chunk in common.points.chunk_by(|p, q| p.facet_a == q.facet_a) {
-        let facet = chunk[0].facet_a;
-        let nodes = a.on_facet(facet);
-        let basis = PressureBasis::on(a.facets.order, nodes.len(), chunk, &b.facets, a.axis_of(facet));
-        carriers[facet] = Some(basis.carriers());
+        let cover = &mut all[chunk[0].facet_a];
+        cover.share = chunk.iter().map(|point| point.weight).sum::<f64>() / cover.measure;
+        let basis = PressureBasis::on(order, a, &b.facets, cover.ends, chunk);
+        let nodes = a.on_facet(chunk[0].facet_a);
         for point in chunk {
-            let (phi, shapes) =
-                (element::values(a.facets.order, &point.at_a), basis.shapes(a.facets.order, &point.at_a));
-            let psi = element::values(b.facets.order, &point.at_b);
+            let (phi, psi) = (element::values(order, &point.at_a), element::values(b.facets.order, &point.at_b));
             let others = b.on_facet(point.facet_b);
-            for (i, &node) in nodes.iter().enumerate() {
-                let mu = point.weight * basis.value(i, &shapes, &point.at_a);
-                if mu == 0.0 {
-                    continue;
-                }
+            for (&node, mu) in nodes.iter().zip(&basis.functions(&point.at_a)).filter(|(_, mu)| **mu != 0.0) {
+                let mu = point.weight * mu;
                 let sum = points.entry(node).or_default();
                 sum.weight += mu;
                 sum.gap += mu * point.gap;
@@ -184,8 +151,10 @@ fn integrate<const D: usize>(
                 others.iter().zip(&psi).for_each(|(&n, psi)| *sum.sides[1].entry(n).or_default() += mu * psi);
             }
         }
+        cover.basis = Some(basis);
     }
-    (points, Coverage::of(a, common, &carriers))
+    all.iter_mut().filter(|cover| cover.is_whole()).for_each(|cover| cover.lost = 0);
+    (points, all)
 }
 
 /// Assemble the arrays of a pair from the common pieces of its surfaces.
@@ -242,7 +211,6 @@ pub fn assemble<const D: usize>(
             _ => Measure::Area,
         },
         law,
-        lost: LostPieces::of(a, &cover),
         cover,
     };
     for (index, side) in [a, b].into_iter().enumerate() {
@@ -451,56 +419,23 @@ impl ContactPair {
 
     /// Return the number of facets of side a without a partner.
     pub fn uncovered(&self) -> usize {
-        self.cover.iter().filter(|facet| facet.carriers.is_none()).count()
+        self.cover.iter().filter(|facet| facet.share == 0.0).count()
+    }
+
+    /// Return the number of pieces, and of points of pieces, that the search for common points has lost.
+    pub fn pieces_lost(&self) -> usize {
+        self.cover.iter().map(|facet| facet.lost).sum()
     }
 
     /// Return the number of partially covered facets of side a that take the hat functions of their vertices.
     pub fn averaged(&self) -> usize {
-        let averaged = |facet: &&Coverage| facet.carriers == Some(Carriers::Vertices) && !facet.is_whole();
-        self.cover.iter().filter(averaged).count()
+        let partial = self.cover.iter().filter(|facet| !facet.is_whole());
+        partial.filter(|facet| facet.basis.as_ref().is_some_and(|basis| basis.is_averaged)).count()
     }
 
     /// Return whether the pair has no points, which no pair from [`assemble`] has.
     pub fn is_empty(&self) -> bool {
         self.area.is_empty()
-    }
-}
-
-/// The coverage of a facet of side a by facets of side b.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Coverage {
-    /// Share of its length (area) that is paired.
-    pub share: f64,
-    /// Number of pieces, and of points of pieces, that the search has lost, if it is not fully paired.
-    pub lost: usize,
-    /// Which of its nodes carry points; `None` where it has no partner.
-    pub carriers: Option<Carriers>,
-    /// Whether facets of side b lie before it that are too far away or inclined by too much.
-    pub is_cut_short: bool,
-}
-
-impl Coverage {
-    /// Return the coverage of each facet, from the common pieces and the nodes that carry points.
-    fn of<const D: usize>(a: &Side<D>, common: &Intersection<D>, carriers: &[Option<Carriers>]) -> Vec<Self> {
-        let mut covered = vec![0.0; a.facets.count()];
-        common.points.iter().for_each(|point| covered[point.facet_a] += point.weight);
-        let rule = element::rule(D, if a.facets.order == Order::P1 { 2 } else { 2 * a.facets.order.degree() + 1 });
-        let of_facet = |i: usize| {
-            let refused = &common.refused[i];
-            let found = Self {
-                share: covered[i] / facet_measure(a, i, &rule),
-                lost: 0,
-                carriers: carriers[i],
-                is_cut_short: refused.is_inclined || !refused.far.is_empty(),
-            };
-            Self { lost: if found.is_whole() { 0 } else { refused.lost }, ..found }
-        };
-        (0..covered.len()).map(of_facet).collect()
-    }
-
-    /// Return whether the facet is fully paired.
-    pub fn is_whole(&self) -> bool {
-        self.share > WHOLE
     }
 }
 

@@ -17,7 +17,7 @@
 
 use super::start;
 use super::step::Equilibrium;
-use crate::contact::LayerLaw;
+use crate::contact::law::Law;
 use crate::linalg::dot;
 use crate::model::Model;
 use crate::model::layer::{Layer, in_series, surface_slopes};
@@ -60,7 +60,7 @@ pub(super) fn surface_energy(model: &Model, layer: &Layer) -> f64 {
 }
 
 /// Return the compression within c -+ `roundoff` at which the pressure of a law is nearest to p.
-fn nearest(law: &dyn LayerLaw, point: usize, c: f64, roundoff: f64, p: f64) -> f64 {
+fn nearest(law: &Law, point: usize, c: f64, roundoff: f64, p: f64) -> f64 {
     let difference = if p > 0.0 || law.is_bonded() { law.compression(point, p) - c } else { c.min(0.0) - c };
     if difference.is_finite() { c + difference.clamp(-roundoff, roundoff) } else { c }
 }
@@ -84,7 +84,7 @@ impl Reached {
         let (mut gap, mut mismatch, mut is_bound) = (0.0, 0.0f64, step.is_exact);
         for (q, pair, point) in model.each_point() {
             let p = pressure[q];
-            let c = nearest(&*pair.law, point, compression[q], roundoff[q], p);
+            let c = nearest(&pair.law, point, compression[q], roundoff[q], p);
             let changed = (p - layer.pressure[q]).powi(2) / rho[q];
             mismatch = mismatch.max((p - pair.law.pressure(point, c)).abs());
             let is_on_side = p >= 0.0 || pair.law.is_bonded();
@@ -114,7 +114,8 @@ impl Reached {
     /// the same matrix shows it.
     pub(super) fn add_unbalanced(
         &mut self,
-        (scale, strain): (&Scale, f64),
+        scale: &Scale,
+        strain: f64,
         more: &LinearSolution,
         before: &Layer,
         layer: &Layer,
@@ -135,9 +136,8 @@ impl Reached {
     }
 }
 
-/// The least scales of a run.
-///
-/// They are energies, pressures and forces by which a contact that vanishes is measured.
+/// What errors are measured by where a contact vanishes: a reference energy, and the pressure that gives it to the
+/// surfaces.
 ///
 /// Unconstrained bodies that only an initial overlap presses together move apart until no pressure is left. Then
 /// everything that a relative tolerance could refer to vanishes with the error, and rest or the automatic start is the
@@ -151,45 +151,34 @@ impl Reached {
 /// because it may be any displacement.
 #[derive(Debug, Clone, Default)]
 pub struct Scale {
-    /// Energy: u'Ku + sum omega p c.
+    /// [`PART`] squared of the energy of a start, sum omega p c.
     energy: f64,
     /// Energy of [`PART`] of the last displacements of the surfaces, as deflections.
     moved: f64,
-    pressure: f64,
-    /// Sum of contact forces.
-    force: f64,
     /// Area of all contact surfaces, sum omega.
     area: f64,
     /// Energy that a unit pressure gives all surfaces, sum omega/rho0.
     compliance: f64,
-    /// Stiffness of the surfaces at each point, omega rho0, n; zero where supports hold both sides.
-    foundation: Vec<f64>,
 }
 
 impl Scale {
     /// Return the scales of a model, from traces (2n each) that a run may begin with.
     pub fn new(model: &Model, traces: &[&[f64]]) -> Self {
-        let slopes = surface_slopes(model);
-        let compliance = slopes.iter().zip(&model.area).map(|(slope, area)| area / slope).sum();
-        let stiffness = |(slope, area): (&f64, &f64)| if slope.is_finite() { slope * area } else { 0.0 };
-        let foundation = slopes.iter().zip(&model.area).map(stiffness).collect();
-        let mut scale = Self { area: model.area.iter().sum(), compliance, foundation, ..Self::default() };
-        for trace in traces {
-            let layer = start::at(model, trace);
-            let approach = model.compression(trace);
-            scale.energy = scale.energy.max(PART * PART * dot(&layer.force, &approach));
-            scale.pressure = scale.pressure.max(PART * layer.peak());
-            scale.force = scale.force.max(PART * layer.force.iter().map(|force| force.abs()).sum::<f64>());
+        let energy = |trace: &&[f64]| dot(&start::at(model, trace).force, &model.compression(trace));
+        Self {
+            energy: PART * PART * traces.iter().map(energy).fold(0.0, f64::max),
+            moved: 0.0,
+            area: model.area.iter().sum(),
+            compliance: surface_slopes(model).iter().zip(&model.area).map(|(slope, area)| area / slope).sum(),
         }
-        scale
     }
 
     /// Take note of displacements of the surfaces (trace, 2n): [`PART`] of them, as deflections, are a reference, too.
     /// Supports may move a body as a whole and without contact, so that strains are the rounding of zero.
-    pub fn note_displacements(&mut self, trace: &[f64]) {
-        let (one, other) = trace.split_at(self.foundation.len());
-        let energy =
-            self.foundation.iter().enumerate().map(|(q, stiffness)| stiffness * (one[q].powi(2) + other[q].powi(2)));
+    pub fn note_displacements(&mut self, model: &Model, trace: &[f64]) {
+        let (one, other) = trace.split_at(trace.len() / 2);
+        let square = |q: usize| one[q].powi(2) + other[q].powi(2);
+        let energy = surface_slopes(model).into_iter().enumerate().map(|(q, slope)| slope * model.area[q] * square(q));
         self.moved = PART * PART * energy.sum::<f64>();
     }
 
@@ -216,16 +205,18 @@ impl Scale {
         if numerator <= 0.0 { 0.0 } else { (numerator / self.energy(reference)).sqrt() }
     }
 
-    /// Return [`PART`] of the pressure that gives all contact surfaces the energy u'Ku of the bodies. The pressure of
-    /// soft layers between stiff bodies is no measure of what the bodies carry.
-    fn stress(&self, strain: f64) -> f64 {
-        if self.compliance > 0.0 { PART * (strain.max(0.0) / self.compliance).sqrt() } else { 0.0 }
+    /// Return the pressure that gives all contact surfaces the reference energy, or [`PART`] of the one that gives them
+    /// the energy u'Ku of the bodies. The pressure of soft layers between stiff bodies is no measure of what the bodies
+    /// carry.
+    fn pressure(&self, strain: f64) -> f64 {
+        let energy = self.energy.max(PART * PART * strain);
+        if self.compliance > 0.0 { (energy / self.compliance).sqrt() } else { 0.0 }
     }
 
     /// Return the pressure by which errors of pressures are measured in bodies with u'Ku = `strain`: the largest one
     /// (n), or the least scale.
     pub fn peak(&self, pressure: &[f64], strain: f64) -> f64 {
-        pressure.iter().map(|p| p.abs()).fold(self.pressure.max(self.stress(strain)), f64::max)
+        pressure.iter().map(|p| p.abs()).fold(self.pressure(strain), f64::max)
     }
 
     /// Return the forces out of balance on a body under the contact forces `force` (n), relative to these forces: the
@@ -236,7 +227,7 @@ impl Scale {
     /// layer.
     pub fn imbalance(&self, model: &Model, force: &[f64], strain: f64) -> f64 {
         let mut most = 0.0f64;
-        let least = self.force.max(self.area * self.stress(strain));
+        let least = self.area * self.pressure(strain);
         for (body, slot) in model.bodies.iter().enumerate().filter(|(_, slot)| !slot.motions.is_empty()) {
             let force = model.at_rows(body, force);
             let total = least.max(force.iter().map(|force| force.abs()).sum());
@@ -345,7 +336,7 @@ mod tests {
         assert!(exact.is_bound);
         // a further step that closes the points by 0.01, -0.03, 0 and 0.02
         let more = step(vec![0.01, -0.01, 0.0, 0.0, 0.0, -0.02, 0.0, 0.02], 0.05, 0.1);
-        exact.add_unbalanced((&scale, 5.0), &more, &layer, &layer);
+        exact.add_unbalanced(&scale, 5.0, &more, &layer, &layer);
         close(exact.error, (gap.sqrt() + 2.0 * 0.06f64.sqrt()) / all.sqrt());
         close(exact.pressure, 0.1 + 2.0 * 0.04 / 4.0);
         assert!(!exact.is_bound, "a step that lacks so much of equilibrium is not exact");
@@ -354,7 +345,7 @@ mod tests {
     /// The law p = 4 c, and an open point, whose law has zero pressure at any c < 0.
     #[test]
     fn compressions_are_known_to_their_roundoff() {
-        let law = &*two_pairs().pairs[0].law;
+        let law = &two_pairs().pairs[0].law;
         let all = [(1.0, 4.2), (1.0, 5.0), (1.0, -1.0), (0.05, 0.0), (-1.0, 0.0)];
         assert_eq!(all.map(|(c, p)| nearest(law, 0, c, 0.1, p)), [1.05, 1.1, 0.9, 0.0, -1.0]);
         assert!(nearest(law, 0, f64::NAN, 0.1, 1.0).is_nan());

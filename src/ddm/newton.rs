@@ -315,7 +315,7 @@ impl Newton<'_, '_> {
         let run = &mut *self.run;
         let layer = Layer::new(run.model, iterate.compression.clone());
         let strain = sums[0];
-        run.scale.note_displacements(&self.u.trace);
+        run.scale.note_displacements(run.model, &self.u.trace);
         let mut reached = Reached::new(run.model, &run.scale, strain, step, &iterate.equilibrium(), resolved);
         let unbalanced = run.scale.relative(sums[2], strain + resolved.work);
         reached.verify(unbalanced);
@@ -353,7 +353,7 @@ impl Newton<'_, '_> {
         let counts = self.linear.counts();
         measured.inner_iterations += counts.inner_iterations - before.inner_iterations;
         measured.factorizations += counts.factorizations - before.factorizations;
-        measured.reached.add_unbalanced((&run.scale, measured.strain), &more, layer, &iterate.resolved);
+        measured.reached.add_unbalanced(&run.scale, measured.strain, &more, layer, &iterate.resolved);
         Ok(Some(more))
     }
 

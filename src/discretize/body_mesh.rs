@@ -65,7 +65,7 @@ impl<const D: usize> BodyMesh<D> {
 
     /// Return the displacements of all dofs in a rigid motion.
     pub fn dofs_of(&self, motion: &RigidMotion<D>) -> Vec<f64> {
-        self.held.frame.dofs(&motion.nodal(self.space.nodes.iter().copied()))
+        (0..self.space.nodes.len() as u32).flat_map(|node| self.at_dofs(motion, node)).collect()
     }
 
     /// Return the rigid motions of the free body.
@@ -75,12 +75,12 @@ impl<const D: usize> BodyMesh<D> {
 
     /// Return the displacements of the dofs of a node in a rigid motion.
     pub fn at_dofs(&self, motion: &RigidMotion<D>, node: u32) -> [f64; D] {
-        self.held.frame.at(node, |node| self.at(motion, node))
+        self.held.frame.dofs(node, |node| self.at(motion, node), motion.rotation())
     }
 
     /// Return the displacement of a dof in a rigid motion.
     pub fn dof_of(&self, motion: &RigidMotion<D>, dof: usize) -> f64 {
-        self.held.frame.dof(dof, |node| self.at(motion, node))
+        self.at_dofs(motion, (dof / D) as u32)[dof % D]
     }
 
     /// Return the products of the rigid motions that supports and springs leave, over all dofs without the prescribed
@@ -137,27 +137,26 @@ impl<const D: usize> BodyMesh<D> {
         rigid::of_springs(motions.len(), |k, node| self.at(&motions[k], node), self.springs.iter().flatten())
     }
 
-    /// Return the forces on rigid surfaces, at few nodes of each.
-    pub fn rigid_forces(&self) -> impl Iterator<Item = (u32, [f64; D])> + '_ {
-        self.held.rigid.iter().flat_map(|surface| surface.forces.iter().copied())
+    /// Return the loads on rigid surfaces as forces at dofs.
+    fn rigid_forces(&self) -> impl Iterator<Item = (u32, [f64; D])> + '_ {
+        let forces = self.held.rigid.iter().filter_map(|surface| surface.force);
+        let moments = self.held.rigid.iter().filter_map(|surface| surface.moment);
+        forces.flat_map(|(master, force)| self.held.frame.force(master, force)).chain(moments)
     }
 
     /// Return all loads as forces at dofs.
     pub fn load_on_dofs(&self) -> NodalForces<D> {
-        self.load
-            .iter()
-            .chain(self.rigid_forces())
-            .flat_map(|(node, force)| self.held.frame.force(node, force))
-            .collect()
+        let at_dofs = self.load.iter().flat_map(|(node, force)| self.held.frame.force(node, force));
+        at_dofs.chain(self.rigid_forces()).collect()
     }
 
     /// Return the load vector f at all dofs.
     pub fn load_vector(&self) -> Vec<f64> {
         let mut load = self.load.all(self.space.nodes.len());
+        self.held.frame.forces(&mut load);
         for (node, total) in self.rigid_forces() {
             (0..D).for_each(|c| load[D * node as usize + c] += total[c]);
         }
-        self.held.frame.forces(&mut load);
         load
     }
 

@@ -66,10 +66,10 @@ impl ContactSurface {
                     at_node.push(k < D || order <= Order::P2);
                     sums.push((0.0, BTreeMap::new()));
                 }
-                let Some(carriers) = cover.carriers else { continue };
+                let Some(basis) = &cover.basis else { continue };
                 let (facets, sum) = &mut sums[at as usize];
                 *facets += 1.0;
-                for (shape, of) in carriers.interpolation(order, place).iter().zip(nodes) {
+                for (shape, of) in basis.interpolation(place).iter().zip(nodes) {
                     let source = point_of[*of as usize].filter(|_| *shape != 0.0);
                     source.into_iter().for_each(|q| *sum.entry(q).or_insert(0.0) += shape);
                 }
@@ -93,6 +93,13 @@ impl ContactSurface {
         &self.points
     }
 
+    /// Return the middle of the corners of a facet.
+    pub fn middle(&self, facet: usize) -> [f64; 3] {
+        let corners = &self.connectivity[facet * self.cell.stride()..][..self.cell.dimension + 1];
+        let mean = |c: usize| corners.iter().map(|&at| self.points[at as usize][c]).sum::<f64>() / corners.len() as f64;
+        std::array::from_fn(mean)
+    }
+
     /// Return contact points that are neighbours on a facet.
     pub fn neighbours(&self) -> &[Neighbours] {
         &self.neighbours
@@ -102,7 +109,7 @@ impl ContactSurface {
     /// each once or more. `cover` is the coverage of the facets.
     pub fn beside_cut_short(&self, cover: &[Coverage]) -> impl Iterator<Item = usize> {
         let facets = self.connectivity.chunks_exact(self.cell.stride()).zip(cover);
-        let cut = facets.filter(|(_, cover)| cover.carriers.is_none() && cover.is_cut_short);
+        let cut = facets.filter(|(_, cover)| cover.share == 0.0 && cover.is_cut_short());
         let nodes = cut.flat_map(|(facet, _)| facet);
         nodes.flat_map(|&node| &self.sources[node as usize]).map(|(q, _)| *q)
     }
@@ -143,8 +150,7 @@ impl ContactSurface {
 /// on a face.
 fn neighbours<const D: usize>(a: &Side<D>, pair: &ContactPair, point_of: &[Option<usize>]) -> Vec<Neighbours> {
     let mut all = Vec::new();
-    for (facet, &Coverage { share, .. }) in pair.cover.iter().enumerate().filter(|(_, cover)| cover.carriers.is_some())
-    {
+    for (facet, share) in pair.cover.iter().map(|cover| cover.share).enumerate().filter(|(_, share)| *share > 0.0) {
         let nodes = a.on_facet(facet);
         // the second node of an edge is its other end
         let order: Vec<u32> = if D == 2 { [&nodes[..1], &nodes[2..], &nodes[1..2]].concat() } else { nodes.to_vec() };

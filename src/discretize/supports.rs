@@ -45,8 +45,10 @@ pub struct RigidSurface<const D: usize> {
     pub load: usize,
     /// Its nodes, sorted. The first one is the master, whose dofs move all of them.
     pub nodes: Vec<u32>,
-    /// Nodal forces that do the work of the load on the dofs of the surface.
-    pub forces: Vec<(u32, [f64; D])>,
+    /// The master with the force on the surface.
+    pub force: Option<(u32, [f64; D])>,
+    /// The pole of a surface that turns, with the moment about the master as a force at its dofs.
+    pub moment: Option<(u32, [f64; D])>,
 }
 
 /// Sine below which two directions are the same: half of the digits, so that what is left of the second has the other
@@ -103,7 +105,8 @@ impl<const D: usize> Constraints<D> {
         let rigid = self.rigid.iter().map(|surface| RigidSurface {
             load: surface.load,
             nodes: surface.nodes.iter().filter_map(|&node| here(node)).collect(),
-            forces: surface.forces.iter().filter_map(|&(node, force)| Some((here(node)?, force))).collect(),
+            force: surface.force.and_then(|(node, force)| Some((here(node)?, force))),
+            moment: surface.moment.and_then(|(node, force)| Some((here(node)?, force))),
         });
         Self {
             frame: self.frame.on(nodes),
@@ -153,22 +156,23 @@ impl<const D: usize> Constraints<D> {
             self.prescribed
                 .extend(nodes[1..].iter().flat_map(|&node| (0..D).map(move |c| (D * node as usize + c, 0.0))));
             let force = total.map(|component| load.factor * component);
-            let mut forces = Vec::new();
+            let mut at_pole = None;
             if let Some(moment) = moment {
                 let facets = space.facets(group);
                 if surface::measure(space, &facets) == 0.0 {
                     return Err(without_area(&load.on, spec));
                 }
-                forces.extend(self.turn(&nodes, centre(space, &facets), force, moment.map(|m| load.factor * m), space));
+                let moment = moment.map(|m| load.factor * m);
+                at_pole = Some(self.turn(&nodes, centre(space, &facets), force, moment, space));
             }
-            forces.push((master, std::array::from_fn(|c| force[c])));
-            self.rigid.push(RigidSurface { load: index, nodes, forces });
+            let force = Some((master, std::array::from_fn(|c| force[c])));
+            self.rigid.push(RigidSurface { load: index, nodes, force, moment: at_pole });
         }
         Ok(())
     }
 
-    /// Let a rigid surface with these `nodes` turn. Return nodal forces that do the work of the `moment` and of the
-    /// force, which acts at the `centre`, on the rotation.
+    /// Let a rigid surface with these `nodes` turn. Return the pole, with the force at its dofs that does
+    /// the work of the `moment` and of the force, which acts at the `centre`, on the rotation.
     fn turn(
         &mut self,
         nodes: &[u32],
@@ -176,14 +180,14 @@ impl<const D: usize> Constraints<D> {
         force: [f64; 3],
         moment: [f64; 3],
         space: &Space<D>,
-    ) -> Vec<(u32, [f64; D])> {
+    ) -> (u32, [f64; D]) {
         let x = |node: u32| space.nodes[node as usize];
         let pole = self.frame.let_turn(nodes, x);
         for c in 0..if D == 2 { 1 } else { D } {
             self.prescribed.remove(&(D * pole as usize + c));
         }
         let about_master = cross(minus(centre, pad(x(nodes[0]))), force);
-        self.frame.couple([nodes[0], pole], std::array::from_fn(|c| moment[c] + about_master[c]), x)
+        (pole, self.frame.moment(pole, std::array::from_fn(|c| moment[c] + about_master[c])))
     }
 
     /// Turn the conditions at a node into prescribed dofs. If the conditions are inclined, the node gets axes of its

@@ -170,7 +170,7 @@ impl Influence {
             let here = compression[g] + between(&rigid) - point.gap;
             let c = pair.law.resolvent(point.nearest, here + compliance * between(pressure), 1.0 / compliance);
             let discrete: f64 = points.pressing.row(g).map(|(q, mu)| mu * pressure[q]).sum();
-            let missed = pair.law.response(point.nearest, c).pressure - discrete;
+            let missed = pair.law.pressure(point.nearest, c) - discrete;
             point.weight * missed * between(&self.unfollowed)
         };
         let mut each = points.each.iter().enumerate();

@@ -1,6 +1,7 @@
 //! The errors of the pressures of pairs: between contact points, and at rims.
 
-use crate::contact::{ContactPair, FinePoints};
+use crate::contact::law::Law;
+use crate::contact::{FinePoint, FinePoints};
 use crate::discretize::meshes::KeptMeshes;
 use crate::model::layer::meeting_slopes;
 use crate::model::{Layer, Model};
@@ -225,74 +226,93 @@ pub(super) struct LayerError {
 }
 
 impl LayerError {
-    /// Compute the error of a pair with contact points `range`. `giving` is the closing of the recovered displacements
-    /// of both bodies at each integration point. `beyond` is what the compression of each contact point lacks as a
-    /// mean.
-    ///
-    /// The recovered displacements belong to the interpolated pressure p_i of the contact points, and close the gap to
-    /// the compression c*. Let s be the compliance of the bodies to a pressure that varies within a facet. A pressure p
-    /// then leaves the compression c* - s (p - p_i), and the intersection of this line with the law is the estimate.
+    /// Compute the error of pair `index`. `giving` is the closing of the recovered displacements of both bodies at each
+    /// integration point. `beyond` is what the compression of each contact point lacks as a mean.
     pub fn new(
-        pair: &ContactPair,
+        model: &Model,
         points: &FinePoints,
-        soft: f64,
         layer: &Layer,
-        range: Range<usize>,
+        index: usize,
         giving: &[f64],
         beyond: &[f64],
     ) -> Self {
-        let (compression, pressure) = (&layer.compression[range.clone()], &layer.pressure[range.clone()]);
-        let tangent = &layer.tangent[range];
+        let (law, soft, range) = (&model.pairs[index].law, softness(model, index), model.range(index));
+        let [compression, pressure, tangent] =
+            [&layer.compression, &layer.pressure, &layer.tangent].map(|values| &values[range.clone()]);
+        let least = if law.is_bonded() { f64::NEG_INFINITY } else { 0.0 };
         let mut error = Self { energy: 0.0, pressure: Vec::with_capacity(giving.len()) };
-        let is_bonded = pair.law.is_bonded();
-        let least = if is_bonded { f64::NEG_INFINITY } else { 0.0 };
-        for (g, giving) in giving.iter().enumerate() {
-            let point = &points.each[g];
-            let (compliance, nearest) = (point.size * soft / PI, point.nearest);
-            let carriers = || points.interpolation.row(g);
-            let is_whole = is_bonded || carriers().all(|(q, _)| compression[q] >= 0.0);
-            // A curve through points of which some are open may rise above all of them, the more the faster the gap
-            // grows. No pressure follows from such a rise.
-            let between = |value: &dyn Fn(usize) -> f64| {
-                let curve: f64 = carriers().map(|(q, share)| share * value(q)).sum();
-                let largest = || carriers().map(|(q, _)| value(q)).fold(f64::NEG_INFINITY, f64::max);
-                if is_whole { curve } else { curve.min(largest()) }
-            };
-            let met = |state: f64| {
-                let c = pair.law.resolvent(nearest, state, 1.0 / compliance);
-                (c, pair.law.response(nearest, c).pressure)
-            };
-            let (c_h, p_h) = met(between(&|q| compression[q] + compliance * pressure[q]));
-            let lacking: f64 = carriers().map(|(q, share)| share * beyond[q]).sum();
-            let here = giving - point.gap - lacking;
-            let (c, p) = met(here + compliance * between(&|q| pressure[q]).max(least));
+        for (g, (giving, point)) in giving.iter().zip(&points.each).enumerate() {
+            let carriers: Vec<(usize, f64)> = points.interpolation.row(g).collect();
+            let is_whole = law.is_bonded() || carriers.iter().all(|(q, _)| compression[*q] >= 0.0);
+            let between = Between { law, point, carriers, is_whole, compliance: point.size * soft / PI };
+            let (c_h, p_h) = between.meet(between.value(|q| compression[q] + between.compliance * pressure[q]));
+            let recovered = giving - point.gap - between.curve(|q| beyond[q]);
+            let (c, p) = between.meet(recovered + between.compliance * between.value(|q| pressure[q]).max(least));
             error.energy += point.weight * (p - p_h) * (c - c_h);
             let (mut discrete, mut amplified) = (0.0, 0.0);
             for (q, mu) in points.pressing.row(g) {
                 discrete += mu * pressure[q];
                 amplified += mu * mu;
             }
-            let stiffness = carriers().map(|(q, _)| tangent[q]).fold(0.0, f64::max) * compliance;
-            let of_law = match () {
-                () if is_whole => weight_of_law(stiffness, 1.0),
-                // With the weight below, quadratic facets in space had 0.57 of the error under a layer of 1e8.
-                () if point.at_edges => 1.0,
-                () => weight_of_law(stiffness / (1.0 + stiffness), amplified),
-            };
-            error.pressure.push(discrete + of_law * (p - discrete));
+            error.pressure.push(discrete + between.weight_of_law(tangent, amplified) * (p - discrete));
         }
         error
     }
 }
 
-/// Return the weight of the law's pressure relative to that of the discrete problem.
+/// The layer at an integration point, between contact points.
 ///
-/// Let e be the error of displacements and s the compliance. The pressure of the law has the error `stiffness` times
-/// e/s. The discrete pressure is a sum of values with errors of e/s each, so its error is the root of `amplified` times
-/// e/s. The mean of both with the least variance has weights in proportion to one over their squares.
-///
-/// In a facet whose points are all closed, the error of the law is kappa e, since p_i is wrong together with c*.
-/// Elsewhere it is e/(s + 1/kappa). Here kappa is the tangent stiffness of the law.
-fn weight_of_law(stiffness: f64, amplified: f64) -> f64 {
-    amplified / (amplified + stiffness * stiffness)
+/// The recovered displacements belong to the interpolated pressure p_i of the contact points, and close the gap to the
+/// compression c*. Let s be the compliance of the bodies to a pressure that varies within a facet. A pressure p then
+/// leaves the compression c* - s (p - p_i), and the intersection of this line with the law is the estimate.
+struct Between<'a> {
+    law: &'a Law,
+    point: &'a FinePoint,
+    /// The contact points around it, with the values of their shape functions.
+    carriers: Vec<(usize, f64)>,
+    /// Whether all of them are closed, or bonded.
+    is_whole: bool,
+    /// s.
+    compliance: f64,
+}
+
+impl Between<'_> {
+    /// Return the curve through values of the contact points.
+    fn curve(&self, value: impl Fn(usize) -> f64) -> f64 {
+        self.carriers.iter().map(|(q, share)| share * value(*q)).sum()
+    }
+
+    /// Return the curve through values of the contact points, or the largest one where the curve is above all of them
+    /// and some points are open: it rises the more the faster the gap grows, and no pressure follows from such a rise.
+    fn value(&self, value: impl Fn(usize) -> f64) -> f64 {
+        let curve = self.curve(&value);
+        let largest = || self.carriers.iter().map(|(q, _)| value(*q)).fold(f64::NEG_INFINITY, f64::max);
+        if self.is_whole { curve } else { curve.min(largest()) }
+    }
+
+    /// Return the compression and the pressure on the law with c + s p = `state`.
+    fn meet(&self, state: f64) -> (f64, f64) {
+        let c = self.law.resolvent(self.point.nearest, state, 1.0 / self.compliance);
+        (c, self.law.pressure(self.point.nearest, c))
+    }
+
+    /// Return the weight of the law's pressure relative to that of the discrete problem, a / (a + kappa^2 s^2) where
+    /// all points are closed. `tangent` has the tangents of the contact points, and kappa is the largest one around.
+    ///
+    /// Let e be the error of displacements. The pressure of the law has the error kappa e, since p_i is wrong together
+    /// with c*, or e/(s + 1/kappa) in a facet of which some points are open. The discrete pressure is a sum of values
+    /// with errors of e/s each, so its error is the root of a = `amplified` times e/s, and a is one where all points are
+    /// closed. The mean of both with the least variance has weights in proportion to one over their squares.
+    fn weight_of_law(&self, tangent: &[f64], amplified: f64) -> f64 {
+        let stiffness = self.carriers.iter().map(|(q, _)| tangent[*q]).fold(0.0, f64::max) * self.compliance;
+        let weight = |stiffness: f64, amplified: f64| amplified / (amplified + stiffness * stiffness);
+        if self.is_whole {
+            weight(stiffness, 1.0)
+        } else if self.point.at_edges {
+            // with the weight below, quadratic facets in space had 0.57 of the error under a layer of 1e8
+            1.0
+        } else {
+            weight(stiffness / (1.0 + stiffness), amplified)
+        }
+    }
 }

@@ -233,8 +233,8 @@ impl Rules {
     pub fn new<const D: usize>(order: Order) -> Self {
         let of_degree = |degree: usize| element::rule(D + 1, degree).with_shapes(order);
         let degree = order.degree();
-        let varying = if order == Order::P1 { 2 } else { 2 * degree + 1 };
-        Self { affine: of_degree(2 * degree - 2), curved: of_degree(2 * degree + 1), varying: of_degree(varying) }
+        let varying = element::rule_of_products(D + 1, order).with_shapes(order);
+        Self { affine: of_degree(2 * degree - 2), curved: of_degree(2 * degree + 1), varying }
     }
 
     /// Return the rule for a cell.
@@ -468,8 +468,8 @@ impl<const D: usize> FromIterator<(u32, [f64; D])> for NodalForces<D> {
 /// Return the nodal forces of a body force `density` (per volume) on the cells of a space.
 pub fn body_force<const D: usize>(space: &Space<D>, density: &dyn Fn([f64; D]) -> [f64; D]) -> NodalForces<D> {
     let low = space.order == Order::P1 && !space.axisymmetric;
-    let degree = if low { 2 } else { (2 * space.order.degree() + 1).max(5) };
-    let rule = element::rule(D + 1, degree).with_shapes(space.order);
+    let of_order = if low { Order::P1 } else { space.order.max(Order::P2) };
+    let rule = element::rule_of_products(D + 1, of_order).with_shapes(space.order);
     let (space, nodes) = space.part(0..space.cell_count());
     let mut load = vec![0.0; space.dofs()];
     for index in 0..space.cell_count() {

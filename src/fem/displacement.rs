@@ -214,7 +214,7 @@ pub fn norms_of_error<const D: usize>(
     u: &[f64],
     exact: &dyn Fn([f64; D]) -> Exact<D>,
 ) -> [Norms; 2] {
-    let rule = element::rule(D + 1, (2 * space.order.degree() + 1).max(5)).with_shapes(space.order);
+    let rule = element::rule_of_products(D + 1, space.order.max(Order::P2)).with_shapes(space.order);
     let mut squares = [Norms::default(); 2];
     for index in cells {
         for point in space.points(index, &rule).flatten() {

@@ -226,6 +226,13 @@ impl Rule {
     }
 }
 
+/// Return the rule for products of two functions of an order where the measure or a factor varies, as on curved
+/// simplices: of degree 2k + 1, and of degree 2 for linear functions, whose simplices are straight. Other functions
+/// than polynomials take at least the rule for order 2.
+pub fn rule_of_products(vertices: usize, order: Order) -> Rule {
+    rule(vertices, if order == Order::P1 { 2 } else { 2 * order.degree() + 1 })
+}
+
 /// Return the rule on the simplex with so many vertices that is exact for polynomials of `degree`, at most 5 on
 /// tetrahedra, whose elements have an order of at most two.
 ///

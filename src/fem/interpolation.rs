@@ -109,10 +109,16 @@ fn mean_of_vertices<const D: usize>(
 mod tests {
     use super::*;
     use crate::fem::space::sample::block;
+    use nalgebra::Vector3;
 
     /// Return the values at all dofs, and those at the dofs of coarse nodes.
     fn both(space: &Space<3>, frame: &Frame<3>, u: impl Fn(&[f64; 3]) -> [f64; 3]) -> (Vec<f64>, Vec<f64>) {
-        let all = frame.dofs(&space.nodes.iter().flat_map(u).collect::<Vec<_>>());
+        let at = |(node, x): (u32, &[f64; 3])| match frame.row(node) {
+            [] => u(x),
+            [(own, turned)] if *own == node => turned.tr_mul(&Vector3::from(u(x))).into(),
+            _ => [0.0; 3],
+        };
+        let all: Vec<f64> = (0u32..).zip(&space.nodes).flat_map(at).collect();
         let coarse = coarse_nodes(space, frame);
         let few = coarse.iter().flat_map(|&node| all[3 * node as usize..3 * node as usize + 3].to_vec()).collect();
         (all, few)

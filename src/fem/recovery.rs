@@ -215,7 +215,7 @@ impl<'a, const D: usize> Recovery<'a, D> {
     /// nearly incompressible body lock, and their small displacements have small means.
     fn energy_errors(&self) -> Vec<f64> {
         let order = self.space.order;
-        let rule = element::rule(D + 1, (2 * order.degree() + 1).max(5)).with_shapes(order);
+        let rule = element::rule_of_products(D + 1, order.max(Order::P2)).with_shapes(order);
         let means = (order == Order::P2).then(|| self.mean_dilatations(&rule));
         let of_cell = |index: usize| {
             let (mut energy, mut with_mean) = (0.0, 0.0);
@@ -284,8 +284,7 @@ impl<'a, const D: usize> Recovery<'a, D> {
     fn interpolation_error(&self) -> (Vec<f64>, Vec<f64>) {
         let space = self.space;
         // The gradient of b has one degree more than the elements, and that of v has one less.
-        let degree = if space.order == Order::P1 { 2 } else { 2 * space.order.degree() + 1 };
-        let rule = element::rule(D + 1, degree).with_shapes(space.order);
+        let rule = element::rule_of_products(D + 1, space.order).with_shapes(space.order);
         let mut residual = vec![0.0; space.dofs()];
         let of_cell = |index: usize| {
             let mut energy = 0.0;

@@ -68,6 +68,11 @@ impl<const D: usize> RigidMotion<D> {
         u
     }
 
+    /// Return the rotation vector (x, y, z).
+    pub fn rotation(&self) -> [f64; 3] {
+        std::array::from_fn(|k| self.weights[3 + k] / self.size)
+    }
+
     /// Return the displacements of points, `D` entries each.
     pub fn nodal(&self, points: impl Iterator<Item = [f64; D]>) -> Vec<f64> {
         points.flat_map(|x| self.at(&x)).collect()

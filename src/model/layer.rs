@@ -6,7 +6,7 @@
 //! the bodies give. Robin sweeps take the state at that compression.
 
 use super::Model;
-use crate::contact::{Measure, law};
+use crate::contact::Measure;
 
 /// The state of the layer of every contact point, with the tangent of its law.
 #[derive(Debug, Clone, Default)]
@@ -25,7 +25,7 @@ pub struct Layer {
     pub work: f64,
     /// Number of points with c > 0.
     pub closed: usize,
-    /// mu, n: energy per area by which the laws are smoothed ([`law::resolve`]); empty for the laws themselves. With
+    /// mu, n: energy per area by which the laws are smoothed ([`Law::resolve`](crate::contact::law::Law::resolve)); empty for the laws themselves. With
     /// smoothed laws `energy` is zero.
     pub smoothing: Vec<f64>,
 }
@@ -37,9 +37,10 @@ impl Layer {
         for (i, pair) in model.pairs.iter().enumerate() {
             let mut energy = 0.0;
             for q in model.range(i) {
-                let response = pair.law.response(q - model.offset[i], compression[q]);
-                energy += model.area[q] * response.energy;
-                layer.push(model.area[q], compression[q], response.pressure, response.tangent);
+                let (point, c) = (q - model.offset[i], compression[q]);
+                let (pressure, tangent) = pair.law.pressure_and_tangent(point, c);
+                energy += model.area[q] * pair.law.energy(point, c);
+                layer.push(model.area[q], c, pressure, tangent);
             }
             layer.energy.push(energy);
         }
@@ -76,7 +77,7 @@ impl Layer {
         }
         let mut layer = Self { smoothing: smoothing.to_vec(), energy: vec![0.0; model.pairs.len()], ..Self::default() };
         for (q, pair, point) in model.each_point() {
-            let state = law::resolve(&*pair.law, point, sum(q), rho[q], smoothing[q]);
+            let state = pair.law.resolve(point, sum(q), rho[q], smoothing[q]);
             layer.push(model.area[q], state.compression, state.pressure, state.tangent);
         }
         layer

@@ -389,8 +389,8 @@ fn free_gap(pair: &ContactPair, q: usize) -> f64 {
 #[cfg(test)]
 pub(crate) mod sample {
     use super::*;
-    use crate::contact::law::LinearLaw;
-    use crate::contact::{LayerLaw, Response};
+    use crate::contact::Measure;
+    use crate::contact::law::{Law, LayerLaw, Power};
     use crate::linalg::Csr;
 
     /// omega of the points.
@@ -401,17 +401,21 @@ pub(crate) mod sample {
     struct Square([f64; 2]);
 
     impl LayerLaw for Square {
-        fn compressed(&self, point: usize, c: f64) -> Response {
+        fn pressure_and_tangent(&self, point: usize, c: f64) -> (f64, f64) {
             let s = self.0[point];
-            Response { pressure: s * c * c, tangent: 2.0 * s * c, energy: s * c.powi(3) / 3.0 }
+            (s * c * c, 2.0 * s * c)
+        }
+
+        fn energy(&self, point: usize, c: f64) -> f64 {
+            self.0[point] * c.powi(3) / 3.0
         }
     }
 
     /// Return two bodies with two pairs of two points each. The law is p = 4 c in the first pair and p = c^2 in the
     /// second.
     pub fn two_pairs() -> Model {
-        let laws: [Rc<dyn LayerLaw>; 2] = [Rc::new(LinearLaw { stiffness: 4.0 }), Rc::new(Square([1.0; 2]))];
-        let pair = |(i, law): (usize, Rc<dyn LayerLaw>)| ContactPair {
+        let laws = [Law::new(Power::linear(4.0)), Law::new(Square([1.0; 2]))];
+        let pair = |(i, law): (usize, Law)| ContactPair {
             surfaces: ["a".to_owned(), "b".to_owned()],
             bodies: [0, 1],
             nodes: vec![0, 1],
@@ -432,10 +436,9 @@ pub(crate) mod sample {
             nodal: [Csr::new(0), Csr::new(0)],
             resultant: [vec![[0.0; 3]; 2], vec![[0.0; 3]; 2]],
             moment: [vec![[0.0; 3]; 2], vec![[0.0; 3]; 2]],
-            measure: crate::contact::Measure::Length,
+            measure: Measure::Length,
             law,
             cover: Vec::new(),
-            lost: None,
         };
         let body = |side: usize, row_stiffness: [f64; 4]| BodySlot {
             name: side.to_string(),

@@ -2,7 +2,7 @@
 
 use super::cg::{MOST_SWEEPS, conjugate_gradients};
 use super::sweep::Sweeper;
-use crate::contact::law::LayerLaw;
+use crate::contact::law::Law;
 use crate::error::Result;
 use crate::model::Model;
 use crate::model::field::{Field, zero};
@@ -49,7 +49,7 @@ pub fn interval(model: &mut Model, layer: &Layer, excess: f64) -> Result<Option<
     let (mut least, mut most) = (Vec::new(), Vec::new());
     for (q, pair, point) in model.each_point() {
         let weight = model.area[q];
-        let [low, high] = tangents(&*pair.law, point, layer.compression[q], excess.max(0.0) / weight);
+        let [low, high] = tangents(&pair.law, point, layer.compression[q], excess.max(0.0) / weight);
         least.push(weight * low);
         most.push(weight * high);
     }
@@ -80,9 +80,9 @@ fn extremes(model: &mut Model, springs: &[f64]) -> Result<Option<(f64, f64)>> {
 /// Return the least and the largest p' at a point over the compressions that it can have in the level set, if it has c
 /// at the solution. F1 is convex, and its excess over the minimum is at least that of any one point alone: with the
 /// law's energy P and pressure p per area, P(c) - P(c0) - p(c0) (c - c0) <= `excess`, also per area.
-fn tangents(law: &dyn LayerLaw, point: usize, c: f64, excess: f64) -> [f64; 2] {
-    let (here, excess) = (law.response(point, c), excess * (1.0 + DIGITS));
-    let rise = |other: f64| law.response(point, other).energy - here.energy - here.pressure * (other - c);
+fn tangents(law: &Law, point: usize, c: f64, excess: f64) -> [f64; 2] {
+    let (pressure, energy, excess) = (law.pressure(point, c), law.energy(point, c), excess * (1.0 + DIGITS));
+    let rise = |other: f64| law.energy(point, other) - energy - pressure * (other - c);
     // below zero, a compression has no energy: all open states are the same
     let (first, can_open) = if law.is_bonded() { (c, false) } else { (c.max(0.0), c <= 0.0 || rise(0.0) <= excess) };
     let way = |side: f64| {
@@ -90,6 +90,6 @@ fn tangents(law: &dyn LayerLaw, point: usize, c: f64, excess: f64) -> [f64; 2] {
         zero(beyond, beyond(0.0), DIGITS).unwrap_or(f64::INFINITY)
     };
     let (low, high) = (if can_open { 0.0 } else { c - way(-1.0) }, first + way(1.0));
-    let all = (0..=PARTS).map(|i| law.response(point, low + (high - low) * i as f64 / PARTS as f64).tangent);
+    let all = (0..=PARTS).map(|i| law.pressure_and_tangent(point, low + (high - low) * i as f64 / PARTS as f64).1);
     all.fold([f64::INFINITY, 0.0], |[least, most], k| [least.min(k), f64::max(most, k)])
 }

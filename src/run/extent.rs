@@ -8,6 +8,14 @@ use crate::estimate::softness;
 use crate::fem::{length, minus};
 use crate::output::Extent;
 
+/// Return the sizes of the parts in contact and open.
+fn extent(measure: Measure, contact: f64, open: f64) -> Extent {
+    match measure {
+        Measure::Length => Extent::Length { contact_length: contact, open_length: open },
+        Measure::Ring | Measure::Area => Extent::Area { contact_area: contact, open_area: open },
+    }
+}
+
 /// Return the size of the contact of pair `i`, and in the plane the points where it begins or ends, in the order of the
 /// contact points.
 ///
@@ -44,14 +52,6 @@ pub fn of(done: &Done, i: usize) -> (Extent, Vec<[f64; 3]>) {
     let scale = pair.area.iter().sum::<f64>() / all;
     ends.sort_by_key(|(q, _)| *q);
     (extent(pair.measure, scale * closed, scale * open), ends.into_iter().map(|(_, x)| x).collect())
-}
-
-/// Return the sizes of the parts in contact and open.
-fn extent(measure: Measure, contact: f64, open: f64) -> Extent {
-    match measure {
-        Measure::Length => Extent::Length { contact_length: contact, open_length: open },
-        Measure::Ring | Measure::Area => Extent::Area { contact_area: contact, open_area: open },
-    }
 }
 
 /// Return where contact ends between a closed and an open point, as a share t of the interval from the closed one. `c`

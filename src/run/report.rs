@@ -242,7 +242,7 @@ fn pair_report(done: &Done, i: usize, approach: Option<f64>) -> PairReport {
         points: pair.len(),
         carrier: pair.surfaces[0].clone(),
         facets_uncovered: pair.uncovered(),
-        pieces_lost: pair.lost.map_or(0, |lost| lost.pieces),
+        pieces_lost: pair.pieces_lost(),
         facets_averaged: pair.averaged(),
         layer_energy: layer.energy[i],
         force: sides.map(|side| results::resultant(force, &pair.resultant[side])),

@@ -3,7 +3,7 @@
 
 use super::stages::{All, Built, Done, Recovered};
 use super::{extent, numbered};
-use crate::contact::{ContactPair, Measure, moment_in_scene};
+use crate::contact::{ContactPair, moment_in_scene};
 use crate::discretize::{BodyInfo, Discrete, ForceBalance, Obstacle, mean_normal};
 use crate::error::{Result, few};
 use crate::exchange::all_gather;
@@ -224,7 +224,7 @@ pub fn names_of_results(built: &Built) -> ResultNames {
         pairs: pair_names(built),
         reactions: numbered(reactions),
         dimension: built.scene.dimension.value,
-        measure: built.discrete.model.pairs.first().map_or(Measure::Length, |pair| pair.measure).name(),
+        measure: built.discrete.model.pairs.first().map_or("length", |pair| pair.measure.name()),
     }
 }
 

@@ -5,7 +5,7 @@ use super::in_words;
 use super::results;
 use super::stages::Done;
 use super::verdict::{is_solved, without_shear};
-use crate::contact::{Chords, ContactPair, LostPieces, Measure};
+use crate::contact::{Chords, Coverage, Measure};
 use crate::discretize::Discrete;
 use crate::estimate::{Cause, Estimate, softness};
 use crate::fem::{length, minus};
@@ -35,7 +35,7 @@ pub fn of_problem(session: &Session, discrete: &Discrete) -> Vec<String> {
     }
     warnings.extend(of_mechanisms(discrete));
     warnings.extend(discrete.bodies.iter().filter_map(|body| body.warning.clone()));
-    warnings.extend(of_surfaces(&discrete.model.pairs, &discrete.specs));
+    warnings.extend(of_surfaces(discrete));
     warnings
 }
 
@@ -142,10 +142,10 @@ fn names(spec: &ContactSpec) -> [&str; 2] {
 }
 
 /// Return the warnings of the surfaces of all pairs.
-fn of_surfaces(pairs: &[ContactPair], specs: &[ContactSpec]) -> Vec<String> {
+fn of_surfaces(discrete: &Discrete) -> Vec<String> {
     let mut warnings = Vec::new();
-    for (pair, spec) in pairs.iter().zip(specs) {
-        warnings.extend(lost(pair, spec));
+    for (i, (pair, spec)) in discrete.model.pairs.iter().zip(&discrete.specs).enumerate() {
+        warnings.extend(lost(discrete, i));
         let overlap = pair.gap.iter().copied().fold(0.0, f64::min);
         // the gap of an obstacle says how far it reaches into the body
         if overlap < 0.0 && !spec.obstacle {
@@ -201,7 +201,7 @@ pub fn by_chords(done: &Done, i: usize) -> Option<String> {
     for q in 0..pair.len() {
         let state = compression[q] + height[q] + give * pressure[q];
         let curved = if give > 0.0 { pair.law.resolvent(q, state, 1.0 / give) } else { state };
-        changed += pair.area[q] * (pair.law.response(q, curved).pressure - pressure[q]).powi(2);
+        changed += pair.area[q] * (pair.law.pressure(q, curved) - pressure[q]).powi(2);
         whole += pair.area[q] * pressure[q].powi(2);
     }
     if changed <= BY_CHORDS.powi(2) * whole {
@@ -226,19 +226,23 @@ pub fn by_chords(done: &Done, i: usize) -> Option<String> {
     ))
 }
 
-/// Return the warning of pieces of a pair that the search for common points has lost, if any.
-fn lost(pair: &ContactPair, spec: &ContactSpec) -> Option<String> {
-    let [a, b] = names(spec);
-    pair.lost.map(|LostPieces { pieces, share, at }| {
-        format!(
-            "{a} - {b}: the search for points has lost {pieces} pieces of `{}`, {:.1e} of its {}, the most near {}: they \
-             carry no pressure; look at the mesh there, and refine what is strongly curved",
-            pair.surfaces[0],
-            share,
-            pair.measure.name(),
-            place(at)
-        )
-    })
+/// Return the warning of pieces of pair `i` that the search for common points has lost, if any, with the uncovered part
+/// of the facets that lost them and the middle of the facet with the largest one.
+fn lost(discrete: &Discrete, i: usize) -> Option<String> {
+    let (pair, surface) = (&discrete.model.pairs[i], &discrete.contacts[i].surface);
+    let uncovered = |cover: &Coverage| if cover.lost > 0 { (1.0 - cover.share) * cover.measure } else { 0.0 };
+    let of_facets = || pair.cover.iter().map(uncovered);
+    let (worst, _) = of_facets().enumerate().max_by(|p, q| p.1.total_cmp(&q.1)).filter(|_| pair.pieces_lost() > 0)?;
+    let [a, b] = names(&discrete.specs[i]);
+    Some(format!(
+        "{a} - {b}: the search for points has lost {} pieces of `{}`, {:.1e} of its {}, the most near {}: they \
+         carry no pressure; look at the mesh there, and refine what is strongly curved",
+        pair.pieces_lost(),
+        pair.surfaces[0],
+        of_facets().sum::<f64>() / pair.cover.iter().map(|cover| cover.measure).sum::<f64>(),
+        pair.measure.name(),
+        place(surface.middle(worst))
+    ))
 }
 
 /// Return the warnings for pair `i`, if its layer is compressed or stretched beyond the end of its law, at the solution

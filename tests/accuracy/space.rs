@@ -6,9 +6,9 @@ use std::collections::BTreeMap;
 use winkler::api::Order;
 use winkler::api::load as load_scene;
 use winkler::internals::Interrupt;
-use winkler::internals::contact::law::{self, OwnLaws};
+use winkler::internals::contact::law::{self, Law, OwnLaws};
 use winkler::internals::contact::pieces::{self, Cut, Reach};
-use winkler::internals::contact::{Carriers, ContactPair, Side, assemble};
+use winkler::internals::contact::{ContactPair, PressureBasis, Side, assemble};
 use winkler::internals::fem::{Frame, Space, assemble as fem};
 use winkler::internals::mesh::{Mesh, load};
 
@@ -103,8 +103,10 @@ fn pair_on<const D: usize>(
     let (a, b) = (side(0), side(1));
     let shared = cut(&a, &b, &Reach::between(&a, &b, 60.0, None));
     let layer = load_scene(&case("patch"), &[]).expect("a scene").contacts.remove(0).layer;
-    let pair =
-        assemble(&a, &b, [0, 1], &shared, &|_| 0.0, &|at| law::make(&layer, &OwnLaws::default(), at)).expect("a pair");
+    let pair = assemble(&a, &b, [0, 1], &shared, &|_| 0.0, &|at| {
+        Ok(Law { compression: law::make(&layer, &OwnLaws::default(), at)?, tension: None })
+    })
+    .expect("a pair");
     (pair, spaces)
 }
 
@@ -204,14 +206,16 @@ fn points_of_quadratic_triangles() {
     let mesh = load::<3>(&load_scene(&path, &[]).expect("a scene").mesh, Order::P2, &Interrupt::default())
         .expect("a mesh")
         .mesh;
-    for (bodies, kinds) in [
-        (["small", "large"], vec![Some(Carriers::MidEdges)]),
-        (["large", "small"], vec![None, Some(Carriers::Vertices), Some(Carriers::MidEdges)]),
-    ] {
+    // which nodes of a facet carry points: the vertices, or the mid-edges
+    let kind = |basis: &PressureBasis| [0, 3].map(|node| basis.carries(node));
+    let [vertices, mid_edges] = [Some([true, false]), Some([false, true])];
+    for (bodies, kinds) in
+        [(["small", "large"], vec![mid_edges]), (["large", "small"], vec![None, vertices, mid_edges])]
+    {
         let groups = bodies.map(|body| format!("{body}_face"));
         let groups = groups.each_ref().map(String::as_str);
         let (pair, spaces) = pair_on(&mesh, [Order::P2; 2], pieces::in_space, bodies, groups);
-        let carriers: Vec<_> = pair.cover.iter().map(|cover| cover.carriers).collect();
+        let carriers: Vec<_> = pair.cover.iter().map(|cover| cover.basis.as_ref().map(kind)).collect();
         assert!(kinds.iter().all(|kind| carriers.contains(kind)), "{bodies:?}: {carriers:?}");
         assert!(carriers.iter().all(|kind| kinds.contains(kind)), "{bodies:?}: {carriers:?}");
         assert!(pair.area.iter().all(|&weight| weight > 0.0), "{bodies:?}: {:?}", pair.area);

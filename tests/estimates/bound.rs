@@ -6,7 +6,7 @@ use winkler::api::Silent;
 use winkler::api::load as load_scene;
 use winkler::error::Result;
 use winkler::internals::Interrupt;
-use winkler::internals::contact::law::LayerLaw;
+use winkler::internals::contact::law::Law;
 use winkler::internals::ddm::Outcome;
 use winkler::internals::model::field::{local_dot, residual};
 use winkler::internals::model::{Field, Model};
@@ -125,16 +125,16 @@ impl Layers {
 
     /// Return sum omega (P(c) + P*(p) - c p). Each term is the area between the law and the corner (c, p).
     fn gap(&self, model: &Model) -> f64 {
-        let at = |q: usize, law: &dyn LayerLaw, point: usize| {
+        let at = |q: usize, law: &Law, point: usize| {
             let (c, p) = (self.compression[q], self.pressure[q].max(0.0));
             integral(law.compression(point, p), c, |s| law.pressure(point, s) - p)
         };
-        model.each_point().map(|(q, pair, point)| model.area[q] * at(q, &*pair.law, point)).sum()
+        model.each_point().map(|(q, pair, point)| model.area[q] * at(q, &pair.law, point)).sum()
     }
 
     /// Return sum omega (D_P(c, c*) + D_P*(p, p*)), the Bregman distances of the energies P and P* from the `exact` layers.
     fn distance(&self, exact: &Layers, model: &Model) -> f64 {
-        let at = |q: usize, law: &dyn LayerLaw, point: usize| {
+        let at = |q: usize, law: &Law, point: usize| {
             let [p_exact, p] = [exact, self].map(|layers| layers.pressure[q].max(0.0));
             let [c_exact, c] = [exact, self].map(|layers| layers.compression[q]);
             let [phi_exact, phi] = [p_exact, p].map(|p| law.compression(point, p));
@@ -142,7 +142,7 @@ impl Layers {
             let of_complement = integral(phi_exact, phi, |s| p - law.pressure(point, s));
             of_energy + of_complement + (phi_exact - c_exact) * (p - p_exact)
         };
-        model.each_point().map(|(q, pair, point)| model.area[q] * at(q, &*pair.law, point)).sum()
+        model.each_point().map(|(q, pair, point)| model.area[q] * at(q, &pair.law, point)).sum()
     }
 }
 

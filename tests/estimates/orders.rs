@@ -1,7 +1,7 @@
 //! Elements of an order above two: adapted meshes, pressures under stiff layers, and contact that ends within an edge.
 
 use crate::common::here::solve_here;
-use crate::common::{Scene, Table, case, solve};
+use crate::common::{Scene, Table, case, solve, winkler};
 use std::fs;
 
 /// Sets of the order of both bodies.
@@ -99,5 +99,19 @@ fn contact_that_ends_within_an_edge() {
         assert!((force / exact - 1.0).abs() < most, "P{order}: {force:e} {exact:e}");
         // the points of the edge lie on its covered part
         assert!(table["x"].iter().all(|&x| x < 2.6 + 1e-9) && table.rows() == 6 * order + 1, "P{order}");
+    }
+}
+
+/// Two arcs over 0 < x < 3 are paired over all of it at any order, also where points of a piece have no partner at its end.
+#[test]
+fn the_last_pieces_of_edges_keep_their_ends() {
+    let path = case("hertz-line").display().to_string();
+    for order in [2, 4, 8] {
+        let [one, other] = orders(order);
+        let sets = ["--set", "mesh.set.n=2", "--set", &one, "--set", &other];
+        let checked = winkler(&[&["check", &path, "--json"][..], &sets].concat());
+        let report: serde_json::Value = serde_json::from_str(&checked.stdout).expect("a report");
+        let length = report["pairs"][0]["length"].as_f64().expect("a length");
+        assert!((length / 3.0 - 1.0).abs() < 1e-5, "P{order}: {length}");
     }
 }

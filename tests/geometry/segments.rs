@@ -5,12 +5,11 @@ use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed, TestRunner};
 use std::collections::{BTreeMap, HashMap};
-use std::rc::Rc;
 use winkler::api::Order;
 use winkler::internals::contact::pieces::{self, Cut, Reach};
 use winkler::internals::contact::{
     Side, assemble,
-    law::{LayerLaw, LinearLaw},
+    law::{Law, Power},
 };
 use winkler::internals::fem::{EDGES, Frame, Space};
 use winkler::internals::mesh::{Group, Mesh};
@@ -287,7 +286,7 @@ fn check<const D: usize>(surfaces: &[Surface; 2], cut: Cut<D>, slack: f64) -> Re
             prop_assert!(miss < 1e-8 && reach.holds(p.gap), "{p:?} misses by {miss}");
             prop_assert!(p.at_b.iter().all(|l| (-0.1001..1.1001).contains(l)), "{p:?} is off its facet");
         }
-        let law = |_: &[[f64; 3]]| Ok(Rc::new(LinearLaw { stiffness: 1.0 }) as Rc<dyn LayerLaw>);
+        let law = |_: &[[f64; 3]]| Ok(Law::new(Power::linear(1.0)));
         let Ok(pair) = assemble(a, b, [0, 1], &common, &|_| 0.0, &law) else {
             prop_assert!(covered < 1e-9, "no pair, but {covered} is covered");
             continue;

@@ -85,13 +85,13 @@ fn pressed(mesh: MeshArrays) -> Scene {
 struct Lazy;
 
 impl LayerLaw for Lazy {
-    fn compressed(&self, _point: usize, c: f64) -> Response {
+    fn pressure_and_tangent(&self, _point: usize, c: f64) -> (f64, f64) {
         // it softens from a compression of one half on
-        Response {
-            pressure: 50.0 * c * (1.0 - c),
-            tangent: 50.0 - 100.0 * c,
-            energy: 25.0 * c * c - 50.0 / 3.0 * c.powi(3),
-        }
+        (50.0 * c * (1.0 - c), 50.0 - 100.0 * c)
+    }
+
+    fn energy(&self, _point: usize, c: f64) -> f64 {
+        25.0 * c * c - 50.0 / 3.0 * c.powi(3)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Laws given by an expression p(c), and the check that a function is the law of a layer.
 
+use super::LayerLaw;
 use super::numeric::integral;
-use super::{LayerLaw, Response};
 use crate::error::{Error, Place, Result, Source, shown};
 use crate::expression::{Expression, KnownNames};
 use crate::linalg::portable::pow;
@@ -15,8 +15,6 @@ pub struct ExpressionLaw {
     place: [f64; 3],
     /// Compression from which the law is a straight line; infinite if it never is.
     end: f64,
-    /// The law there.
-    at_end: Response,
 }
 
 impl ExpressionLaw {
@@ -26,7 +24,7 @@ impl ExpressionLaw {
     /// # Errors
     /// A refusal that points at the expression and names the compression.
     pub fn new(law: &Expression, place: [f64; 3], end: Option<f64>, size: f64) -> Result<Self> {
-        let typed = Self { law: law.clone(), place, end: f64::INFINITY, at_end: Response::default() };
+        let typed = Self { law: law.clone(), place, end: f64::INFINITY };
         let top = end.unwrap_or(size);
         let first = typed.check_first_touch(top)?;
         let last = increases(first, top, |c| typed.value(c)).map_err(|breach| {
@@ -34,7 +32,7 @@ impl ExpressionLaw {
             let outside = typed.refuse_outside(breach.c).err().filter(|_| !breach.is_finite);
             outside.map_or_else(|| typed.refuse(breach.what, &advice), |error| error.help(advice.clone()))
         })?;
-        Ok(if last < top || end.is_some() { typed.up_to(last) } else { typed })
+        Ok(if last < top || end.is_some() { Self { end: last, ..typed } } else { typed })
     }
 
     /// Return the expression of a known law in c and its parameters x and y.
@@ -49,13 +47,7 @@ impl ExpressionLaw {
 
     /// Make a known law of two parameters, which is a straight line beyond `end`.
     pub fn known(law: &Expression, x: f64, y: f64, end: f64) -> Self {
-        let known = Self { law: law.clone(), place: [x, y, 0.0], end: f64::INFINITY, at_end: Response::default() };
-        if end < f64::INFINITY { known.up_to(end) } else { known }
-    }
-
-    /// Return the law that is a straight line beyond `end`.
-    fn up_to(self, end: f64) -> Self {
-        Self { at_end: self.compressed(0, end), end, ..self }
+        Self { law: law.clone(), place: [x, y, 0.0], end }
     }
 
     /// Check that p(0) is zero and p'(0) finite, and return p(0). `top` is the largest compression that will be
@@ -117,25 +109,12 @@ fn advice(last: f64, end: Option<f64>) -> String {
 }
 
 impl LayerLaw for ExpressionLaw {
-    fn compressed(&self, _point: usize, c: f64) -> Response {
-        if c > self.end {
-            return self.at_end.straight(c - self.end);
-        }
-        let (pressure, tangent) = self.value(c);
-        Response { pressure, tangent, energy: integral(&|c| self.curve(c), 0.0, c) }
-    }
-
-    fn pressure(&self, point: usize, c: f64) -> f64 {
-        // The energy of a response costs most.
-        if c > 0.0 && c <= self.end { self.curve(c) } else { self.response(point, c).pressure }
-    }
-
     fn pressure_and_tangent(&self, _point: usize, c: f64) -> (f64, f64) {
-        if c <= self.end {
-            return self.value(c);
-        }
-        let Response { pressure, tangent, .. } = self.at_end.straight(c - self.end);
-        (pressure, tangent)
+        self.value(c)
+    }
+
+    fn energy(&self, _point: usize, c: f64) -> f64 {
+        integral(&|c| self.curve(c), 0.0, c)
     }
 
     fn end(&self, _point: usize) -> f64 {

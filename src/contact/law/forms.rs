@@ -1,7 +1,7 @@
 //! Laws of a known form: linear and power, and cubic and exponential ones, which are expressions.
 
 use super::expression::ExpressionLaw;
-use super::{LayerLaw, PerPoint, Response, search};
+use super::{LayerLaw, PerPoint};
 use crate::error::{Error, Kind, Result, shown};
 use crate::linalg::portable::pow;
 use crate::problem::layer::{LayerSpec, Parameter};
@@ -23,7 +23,7 @@ pub const LINE: f64 = 60.0;
 pub fn make(spec: &LayerSpec, position: &[[f64; 3]]) -> Result<Rc<dyn LayerLaw>> {
     let (_, parameters) = spec.parameters();
     match spec {
-        LayerSpec::Linear(_) => formed(&parameters, position, |v| LinearLaw { stiffness: v[0] }),
+        LayerSpec::Linear(_) => formed(&parameters, position, |v| Power::linear(v[0])),
         LayerSpec::Power(_) => formed(&parameters, position, |v| Power::new(v[0], v[1])),
         LayerSpec::Exponential(_) => {
             let law = ExpressionLaw::text(EXPONENTIAL)?;
@@ -74,60 +74,63 @@ fn checked(&Parameter { key, value: field, bounds }: &Parameter<'_>, x: [f64; 3]
     })
 }
 
-/// The law p(c) = stiffness * c.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LinearLaw {
-    /// Pressure per unit of compression, > 0.
-    pub stiffness: f64,
-}
-
-impl LayerLaw for LinearLaw {
-    fn compressed(&self, _point: usize, c: f64) -> Response {
-        Response { pressure: self.stiffness * c, tangent: self.stiffness, energy: 0.5 * self.stiffness * c * c }
-    }
-
-    /// In closed form, so that a linear layer in full contact is on its law without rounding.
-    fn resolvent(&self, _point: usize, s: f64, rho: f64) -> f64 {
-        if s > 0.0 && s < f64::INFINITY { s / (1.0 + self.stiffness / rho) } else { s }
-    }
-}
-
-/// The law p(c) = (c/B)^(1/a) of the rough surface in the paper's numerical section.
+/// The law p(c) = (k c)^m with m >= 1: the straight line, and the power 1/a of the rough surface in the paper's
+/// numerical section.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Power {
-    b: f64,
+    /// k, one over the compression at unit pressure; with m = 1 a stiffness per area.
+    k: f64,
     exponent: f64,
 }
 
 impl Power {
-    /// Make the law from the compression B > 0 at unit pressure and 0 < a <= 1.
+    /// Make the law p = (c/B)^(1/a) from the compression B > 0 at unit pressure and 0 < a <= 1.
     pub fn new(b: f64, a: f64) -> Self {
-        Self { b, exponent: 1.0 / a }
+        Self { k: b.recip(), exponent: a.recip() }
+    }
+
+    /// Make the law p = `stiffness` c.
+    pub fn linear(stiffness: f64) -> Self {
+        Self { k: stiffness, exponent: 1.0 }
+    }
+
+    /// Return the compression c > 0 with c + p/rho = s for s > 0 and a finite rho, if it has a closed form.
+    ///
+    /// That of a line puts a linear layer in full contact on its law without rounding. That of a parabola is there
+    /// since the search takes a tenth of the time of `blocks` with 1000 blocks.
+    pub(super) fn resolvent(&self, s: f64, rho: f64) -> Option<f64> {
+        let Self { k, exponent } = *self;
+        if exponent == 1.0 {
+            Some(s / (1.0 + k / rho))
+        } else if exponent == 2.0 {
+            Some(2.0 * s / (1.0 + (1.0 + 4.0 * (s * k) * k / rho).sqrt()))
+        } else {
+            None
+        }
+    }
+
+    /// Return the compression at a pressure > 0.
+    pub(super) fn compression(&self, pressure: f64) -> f64 {
+        pow(pressure, self.exponent.recip()) / self.k
     }
 }
 
 impl LayerLaw for Power {
-    fn compressed(&self, _point: usize, c: f64) -> Response {
-        let pressure = pow(c / self.b, self.exponent);
-        Response {
-            pressure,
-            // For a = 1 the tangent is exactly constant, so that a settled contact set changes no matrix.
-            tangent: if self.exponent == 1.0 { 1.0 / self.b } else { self.exponent * pressure / c },
-            energy: pressure * c / (self.exponent + 1.0),
+    fn pressure_and_tangent(&self, _point: usize, c: f64) -> (f64, f64) {
+        let Self { k, exponent } = *self;
+        if exponent == 1.0 {
+            // exactly constant, so that a settled contact set changes no matrix
+            return (k * c, k);
         }
+        let pressure = pow(k * c, exponent);
+        (pressure, exponent * pressure / c)
     }
 
-    /// In closed form for p = (c/B)^2, since the search takes a tenth of the time of `blocks` with 1000 blocks.
-    fn resolvent(&self, point: usize, s: f64, rho: f64) -> f64 {
-        if self.exponent == 2.0 && s > 0.0 && s < f64::INFINITY {
-            2.0 * s / (1.0 + (1.0 + 4.0 * (s / self.b) / self.b / rho).sqrt())
-        } else {
-            search(self, point, s, rho)
-        }
+    fn energy(&self, point: usize, c: f64) -> f64 {
+        self.pressure_and_tangent(point, c).0 * c / (self.exponent + 1.0)
     }
 
-    fn compression(&self, _point: usize, pressure: f64) -> f64 {
-        // The comparison is false for NaN, which is then returned as it is.
-        if pressure <= 0.0 { 0.0 } else { self.b * pow(pressure, self.exponent.recip()) }
+    fn as_power(&self, _point: usize) -> Option<Power> {
+        Some(*self)
     }
 }

@@ -3,7 +3,7 @@
 use super::expression::{Breach, ExpressionLaw, increases};
 use super::forms;
 use super::table::Table;
-use super::{Bonded, LayerLaw, PerPoint, Response};
+use super::{Law, LayerLaw, PerPoint};
 use crate::error::{Error, Kind, Result};
 use crate::linalg::diagonal;
 use crate::problem::layer::LayerSpec;
@@ -15,14 +15,14 @@ use std::rc::Rc;
 ///
 /// # Errors
 /// See [`make`].
-pub fn of_pair(spec: &ContactSpec, laws: &OwnLaws, position: &[[f64; 3]]) -> Result<Rc<dyn LayerLaw>> {
+pub fn of_pair(spec: &ContactSpec, laws: &OwnLaws, position: &[[f64; 3]]) -> Result<Law> {
     let compression = make(&spec.layer, laws, position)?;
     let tension = match &spec.tension {
-        _ if !spec.bond => return Ok(compression),
-        None => compression.clone(),
-        Some(tension) => make(tension, laws, position)?,
+        _ if !spec.bond => None,
+        None => Some(compression.clone()),
+        Some(tension) => Some(make(tension, laws, position)?),
     };
-    Ok(Rc::new(Bonded { compression, tension }))
+    Ok(Law { compression, tension })
 }
 
 /// Make the law of a layer at the contact points `position`. `laws` are the laws that the program brings, by name.
@@ -55,7 +55,7 @@ fn extent(position: &[[f64; 3]]) -> f64 {
 }
 
 /// A function from the contact points of a pair to its law.
-pub type LawMaker<'a> = dyn Fn(&[[f64; 3]]) -> Result<Rc<dyn LayerLaw>> + 'a;
+pub type LawMaker<'a> = dyn Fn(&[[f64; 3]]) -> Result<Law> + 'a;
 
 /// The laws of a Rust program by name. Each entry makes the law of a pair from its contact points.
 pub type OwnLaws = Own<dyn Fn(&[[f64; 3]]) -> Box<dyn LayerLaw>>;
@@ -66,7 +66,7 @@ pub type OwnLaws = Own<dyn Fn(&[[f64; 3]]) -> Box<dyn LayerLaw>>;
 /// # Errors
 /// An unknown name, and a function that is not the law of a layer.
 fn own(laws: &OwnLaws, name: &str, position: &[[f64; 3]], size: f64) -> Result<Rc<dyn LayerLaw>> {
-    let law = laws.get("law of a layer", name)?(position);
+    let law = Law { compression: laws.get("law of a layer", name)?(position).into(), tension: None };
     let refuse = |what: String| Error::new(Kind::Scene, format!("`{name}` is no law of a layer: {what}"));
     let last = match increases(0.0, size, |c| law.pressure_and_tangent(0, c)) {
         // a law may end at a rigid stop, beyond which its values are not finite
@@ -74,9 +74,9 @@ fn own(laws: &OwnLaws, name: &str, position: &[[f64; 3]], size: f64) -> Result<R
         Err(Breach { what, .. }) => return Err(refuse(what)),
         Ok(last) => last,
     };
-    match wrong_energy(&*law, last) {
+    match wrong_energy(&law, last) {
         Some(c) => Err(refuse(format!("the energy is not the integral of p at c = {c:.3e}"))),
-        None => Ok(law.into()),
+        None => Ok(law.compression),
     }
 }
 
@@ -94,21 +94,20 @@ const SUMMED: f64 = 1e-9;
 
 /// Return the first compression up to `last` at which the energy P cannot be the integral of the pressure: p increases,
 /// so that between neighbouring compressions P grows by their distance times a pressure between both of theirs.
-fn wrong_energy(law: &dyn LayerLaw, last: f64) -> Option<f64> {
+fn wrong_energy(law: &Law, last: f64) -> Option<f64> {
     let at = |step: i32| {
         let c = last * 10f64.powf(f64::from(step) / f64::from(FINE_STEPS) - f64::from(ENERGY_DECADES));
-        (c, law.response(0, c))
+        [c, law.pressure(0, c), law.energy(0, c)]
     };
-    let mut before = (0.0, Response::default());
+    let mut before = [0.0; 3];
     for step in 0..=ENERGY_DECADES * FINE_STEPS {
-        let (c, now) = at(step);
-        let (grown, distance) = (now.energy - before.1.energy, c - before.0);
-        let slack = SUMMED * now.energy.abs();
-        let fits = grown >= distance * before.1.pressure - slack && grown <= distance * now.pressure + slack;
+        let now @ [c, pressure, energy] = at(step);
+        let (grown, distance, slack) = (energy - before[2], c - before[0], SUMMED * energy.abs());
+        let fits = grown >= distance * before[1] - slack && grown <= distance * pressure + slack;
         if !fits {
             return Some(c);
         }
-        before = (c, now);
+        before = now;
     }
     None
 }
@@ -133,11 +132,13 @@ mod tests {
     }
 
     impl LayerLaw for Square {
-        fn compressed(&self, _point: usize, c: f64) -> Response {
+        fn pressure_and_tangent(&self, _point: usize, c: f64) -> (f64, f64) {
             let pressure = if self.end > 0.0 && c > self.end { f64::INFINITY } else { c * c * (1.0 - self.cubic * c) };
-            let (tangent, energy) =
-                (2.0 * c - 3.0 * self.cubic * c * c, c.powi(3) / 3.0 - self.cubic * c.powi(4) / 4.0);
-            Response { pressure, tangent, energy: self.energy * energy }
+            (pressure, 2.0 * c - 3.0 * self.cubic * c * c)
+        }
+
+        fn energy(&self, _point: usize, c: f64) -> f64 {
+            self.energy * (c.powi(3) / 3.0 - self.cubic * c.powi(4) / 4.0)
         }
     }
 

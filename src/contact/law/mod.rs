@@ -2,16 +2,16 @@
 //!
 //! The paper writes sigma_n = g(w) with w = -c, where c is the compression. Here the pressure is p(c) = -g(-c). A law
 //! is monotone with p(0) = 0 and has a bounded tangent on bounded ranges, conditions (6)-(7) of the paper. A new law is
-//! a new type, a form in [`layer`](crate::problem::layer) and a line in `make`. A program that uses this library
-//! implements the trait alone: [`OwnLaws`].
+//! a new type with the trait [`LayerLaw`], which says p, p' and the energy P at c > 0, a form in
+//! [`layer`](crate::problem::layer) and a line in `make`. A program that uses this library implements the trait alone:
+//! [`OwnLaws`].
 //!
-//! With p = 0 for c <= 0 a law is a maximal monotone graph of points (c, p). A point is found from its compression
-//! ([`LayerLaw::response`]), from its pressure ([`LayerLaw::compression`]) or from a line of slope -rho that meets the
-//! graph ([`LayerLaw::resolvent`], or [`resolve`] for smoothed laws), by one root finder (`numeric`) where a law has no
-//! closed form. [`LayerLaw::duality_gap`] measures the distance of any (c, p) from the graph. These methods handle the
-//! open layer and the ends of the range.
+//! Everything else follows from these functions. With p = 0 for c <= 0 a law is a maximal monotone graph of points (c,
+//! p), a [`Law`]. A point is found from its compression ([`Law::pressure_and_tangent`]), from its pressure
+//! ([`Law::compression`]) or from a line of slope -rho that meets the graph ([`Law::resolvent`], or [`Law::resolve`]
+//! for smoothed laws), by one root finder (`numeric`) where a law has no closed form. [`Law::duality_gap`] measures the
+//! distance of any (c, p) from the graph. These methods handle the open layer, bonds and the ends of the range.
 
-mod bonded;
 mod expression;
 mod forms;
 mod make;
@@ -20,98 +20,171 @@ mod table;
 #[cfg(test)]
 mod tests;
 
-pub use bonded::Bonded;
-pub use forms::LinearLaw;
-#[cfg(test)]
 pub use forms::Power;
 pub use make::{LawMaker, OwnLaws, make, of_pair};
+use std::rc::Rc;
 pub use table::Table;
 
-/// The response of a layer at one point.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Response {
-    /// p(c), force per area.
-    pub pressure: f64,
-    /// p'(c).
-    pub tangent: f64,
-    /// P(c), the integral of p from 0 to c: energy per area.
-    pub energy: f64,
-}
-
-impl Response {
-    /// Return the response at a compression larger by `beyond`, along the tangent.
-    fn straight(self, beyond: f64) -> Self {
-        Response {
-            pressure: self.pressure + self.tangent * beyond,
-            tangent: self.tangent,
-            energy: self.energy + beyond * (self.pressure + 0.5 * self.tangent * beyond),
-        }
-    }
-}
-
-/// The law of a layer at the points of one pair.
+/// The law of a layer at the points of one pair, for compressions c > 0.
 pub trait LayerLaw: std::fmt::Debug {
-    /// Return the response at contact point `point` to a compression `c > 0`.
-    fn compressed(&self, point: usize, c: f64) -> Response;
+    /// Return the pressure p (force per area) and the tangent p' (stiffness per area) of contact point `point` at a
+    /// compression `c > 0`.
+    fn pressure_and_tangent(&self, point: usize, c: f64) -> (f64, f64);
 
-    /// Return the response to any compression. It is zero for `c <= 0`, where the layer is open; NaN stays NaN.
-    fn response(&self, point: usize, c: f64) -> Response {
-        if c <= 0.0 { Response::default() } else { self.compressed(point, c) }
-    }
+    /// Return P(c), the integral of p from 0 to `c > 0`: energy per area.
+    fn energy(&self, point: usize, c: f64) -> f64;
 
-    /// Return the pressure alone, for searches that need nothing else.
-    fn pressure(&self, point: usize, c: f64) -> f64 {
-        self.response(point, c).pressure
-    }
-
-    /// Return whether the layer is bonded: whether it pulls where it is stretched, at `c < 0`. Such a law has no state
-    /// without pressure but `c = 0`.
-    fn is_bonded(&self) -> bool {
-        false
-    }
-
-    /// Return the compression up to which the law is given at contact point `point`, infinite if it has no end. Beyond
-    /// it the law continues as a straight line, so that iterates may pass it.
+    /// Return the compression up to which the law is given, infinite if it has no end. Beyond it the law goes on along
+    /// its tangent there, so that iterates may pass it.
     fn end(&self, _point: usize) -> f64 {
         f64::INFINITY
     }
 
-    /// Return the stretch up to which the law of a bonded layer is given, in the same way.
-    fn end_in_tension(&self, _point: usize) -> f64 {
-        f64::INFINITY
+    /// Return the law as a power of the compression if it is one, for which states have closed forms.
+    fn as_power(&self, _point: usize) -> Option<Power> {
+        None
     }
+}
 
-    /// Return g'(-c) of (38), the tangent of the paper's law g, which continues into tension as an odd function. For `c > 0` it is
-    /// p'(c). The Robin terms of open points use it, the pressure never does.
-    fn robin_tangent(&self, point: usize, c: f64) -> f64 {
-        self.response(point, c.abs()).tangent
-    }
+/// A law with a parameter that varies over the surface: one law for each contact point.
+#[derive(Debug)]
+pub struct PerPoint<L>(pub Vec<L>);
 
-    /// Return the pressure and the tangent at a compression `c > 0`, for searches that need no energy.
+impl<L: LayerLaw> LayerLaw for PerPoint<L> {
     fn pressure_and_tangent(&self, point: usize, c: f64) -> (f64, f64) {
-        let Response { pressure, tangent, .. } = self.compressed(point, c);
-        (pressure, tangent)
+        self.0[point].pressure_and_tangent(0, c)
     }
 
-    /// Return the compression c of the only point (c, p) of the graph with c + p/rho = s, for a stiffness per area `rho > 0`
-    /// (Minty's parametrisation). It is s itself for `s <= 0` and for an infinite rho; NaN stays NaN.
+    fn energy(&self, point: usize, c: f64) -> f64 {
+        self.0[point].energy(0, c)
+    }
+
+    fn end(&self, point: usize) -> f64 {
+        self.0[point].end(0)
+    }
+
+    fn as_power(&self, point: usize) -> Option<Power> {
+        self.0[point].as_power(0)
+    }
+}
+
+/// The graph of a layer: the points (c, p) that compression and pressure of a contact point may have. It is odd where
+/// the layer pulls by the law by which it pushes, and p = 0 for c <= 0 where it lets go.
+#[derive(Debug, Clone)]
+pub struct Law {
+    /// The law for c > 0.
+    pub compression: Rc<dyn LayerLaw>,
+    /// The law of a bonded layer for c < 0, of the stretch -c and the tension -p.
+    pub tension: Option<Rc<dyn LayerLaw>>,
+}
+
+impl Law {
+    /// Return the graph of a layer that lets go.
+    pub fn new(law: impl LayerLaw + 'static) -> Self {
+        Self { compression: Rc::new(law), tension: None }
+    }
+
+    /// Return the law of the side on which `x`, a compression or a pressure, lies, and the sign of compressions and
+    /// pressures there; `None` where the layer lets go. NaN lies on the side of compressions.
+    fn side(&self, x: f64) -> Option<(&dyn LayerLaw, f64)> {
+        match &self.tension {
+            Some(tension) if x < 0.0 => Some((&**tension, -1.0)),
+            None if x <= 0.0 => None,
+            _ => Some((&*self.compression, 1.0)),
+        }
+    }
+
+    /// Return whether the layer pulls where it is stretched, at c < 0. Such a law has one state without pressure, at
+    /// the origin.
+    pub fn is_bonded(&self) -> bool {
+        self.tension.is_some()
+    }
+
+    /// Return the compression up to which the law is given at a point, infinite if it has no end.
+    pub fn end(&self, point: usize) -> f64 {
+        self.compression.end(point)
+    }
+
+    /// Return the stretch up to which the law of a bonded layer is given, in the same way.
+    pub fn end_in_tension(&self, point: usize) -> f64 {
+        self.tension.as_ref().map_or(f64::INFINITY, |law| law.end(point))
+    }
+
+    /// Return p and p' at any compression. They are zero where the layer is open; NaN stays NaN.
+    pub fn pressure_and_tangent(&self, point: usize, c: f64) -> (f64, f64) {
+        let Some((law, sign)) = self.side(c) else { return (0.0, 0.0) };
+        let (pressure, tangent) = extended(law, point, sign * c);
+        match c {
+            // between compression and tension, where the tangent of a power is not finite
+            0.0 => (0.0, if tangent.is_finite() { tangent } else { 0.0 }),
+            _ => (sign * pressure, tangent),
+        }
+    }
+
+    /// Return p at any compression.
+    pub fn pressure(&self, point: usize, c: f64) -> f64 {
+        self.pressure_and_tangent(point, c).0
+    }
+
+    /// Return P(c), the integral of p from 0 to any compression.
+    pub fn energy(&self, point: usize, c: f64) -> f64 {
+        let Some((law, sign)) = self.side(c).filter(|_| c != 0.0) else { return 0.0 };
+        let (c, end) = (sign * c, law.end(point));
+        if c > end {
+            let (pressure, tangent) = law.pressure_and_tangent(point, end);
+            law.energy(point, end) + (c - end) * (pressure + 0.5 * tangent * (c - end))
+        } else {
+            law.energy(point, c)
+        }
+    }
+
+    /// Return g'(-c) of (38), the tangent of the paper's law g, which continues into tension as an odd function. Where
+    /// the layer is compressed, it is p'(c). The Robin terms of open points use it, the pressure never does.
+    pub fn robin_tangent(&self, point: usize, c: f64) -> f64 {
+        self.pressure_and_tangent(point, if self.is_bonded() { c } else { c.abs() }).1
+    }
+
+    /// Return the compression c of the only point (c, p) of the graph with c + p/rho = s, for a stiffness per area
+    /// `rho > 0` (Minty's parametrisation). It is s itself where the layer is open and for an infinite rho; NaN stays
+    /// NaN.
     ///
     /// Both c and p/rho grow with s, but not by more than s does. The equation holds to the rounding of p(c), which is
     /// a few times 1e-16 s times the exponent of the law at c.
-    fn resolvent(&self, point: usize, s: f64, rho: f64) -> f64 {
-        search(self, point, s, rho)
+    pub fn resolvent(&self, point: usize, s: f64, rho: f64) -> f64 {
+        let Some((law, sign)) = self.side(s) else { return s };
+        // All comparisons are false for NaN, which is then returned as it is.
+        if !(s != 0.0 && s.abs() < f64::INFINITY && rho < f64::INFINITY) {
+            return s;
+        }
+        let size = s.abs();
+        let closed_form = law.as_power(point).and_then(|power| power.resolvent(size, rho));
+        let found = closed_form.unwrap_or_else(|| {
+            let sum = |c: f64| {
+                let (pressure, tangent) = extended(law, point, c);
+                (c + pressure / rho, 1.0 + tangent / rho)
+            };
+            // A law that is NaN from some compression on has a rigid stop there.
+            let (Ok(c) | Err(c)) = numeric::root(size, [0.0, size], size, sum);
+            c
+        });
+        sign * found
     }
 
-    /// Return the compression at which the layer has this pressure. It is 0 for `pressure <= 0` and infinite for a
-    /// pressure that the layer cannot reach in double precision; NaN stays NaN.
-    fn compression(&self, point: usize, pressure: f64) -> f64 {
-        if !(pressure > 0.0 && pressure < f64::INFINITY) {
-            return pressure.clamp(0.0, f64::INFINITY);
+    /// Return the compression at which the layer has this pressure. It is 0 for a tension that it does not have and
+    /// infinite for a pressure that it cannot reach in double precision; NaN stays NaN.
+    pub fn compression(&self, point: usize, pressure: f64) -> f64 {
+        // All graphs pass through the origin, so that pressures have the signs of compressions.
+        let Some((law, sign)) = self.side(pressure) else { return 0.0 };
+        if pressure == 0.0 || !pressure.is_finite() {
+            return pressure;
         }
+        let size = pressure.abs();
         // Without an end the unit of length is unknown, so no start is better than another.
-        let start = self.end(point).min(1.0);
-        numeric::root(pressure, [0.0, f64::MAX], start, |c| self.pressure_and_tangent(point, c))
-            .unwrap_or(f64::INFINITY)
+        let search = || numeric::root(size, [0.0, f64::MAX], law.end(point).min(1.0), |c| extended(law, point, c));
+        sign * match law.as_power(point) {
+            Some(power) => power.compression(size),
+            None => search().unwrap_or(f64::INFINITY),
+        }
     }
 
     /// Return a bound of Fenchel's gap P(c) + P*(p) - c p of a compression `c` and a `pressure` p, which need not be a
@@ -130,7 +203,7 @@ pub trait LayerLaw: std::fmt::Debug {
     ///
     /// The rounding of p(c) itself, 1e-16 p times the exponent of the law, does not count as an error of the gap. It
     /// equals a change of the law's parameters within double precision.
-    fn duality_gap(&self, point: usize, c: f64, pressure: f64) -> f64 {
+    pub fn duality_gap(&self, point: usize, c: f64, pressure: f64) -> f64 {
         if c.is_nan() || pressure.is_nan() {
             return f64::NAN;
         }
@@ -143,42 +216,62 @@ pub trait LayerLaw: std::fmt::Debug {
         // NaN comes from values that overflow or lie beyond the end of a law.
         if pressure < 0.0 && !self.is_bonded() || gap.is_nan() { f64::INFINITY } else { gap.max(0.0) }
     }
+
+    /// Return Minty's resolvent: the only state with c + p/rho = `sum` on the law smoothed by `mu`.
+    ///
+    /// `mu` is an energy per area and `rho > 0` a stiffness per area. With `mu` = 0 the result is the state on the law
+    /// itself.
+    ///
+    /// Let c = phi(p) be the inverse of the law. The smoothed law, as on the central path of an interior-point method,
+    /// is
+    ///
+    /// ```text
+    /// c = phi(p) - mu/p,   p > 0,        kappa = dp/dc = 1 / (phi'(p) + mu/p^2)
+    /// ```
+    ///
+    /// It is strictly monotone and has no corner. At every pressure p the gap s = mu/p remains, so that s p = mu, which
+    /// is the perturbed complementarity condition.
+    ///
+    /// The law need not be inverted. Let P(s) be the pressure at which the law itself meets the line with the sum s. A
+    /// state with the remaining gap y = mu/p has p = P(`sum` + y), so y is the root of y P(`sum` + y) = mu, where the
+    /// left side increases with y. The root is least for a rigid layer, P(s) = rho s, whose gap has a closed form.
+    ///
+    /// A bonded layer neither opens nor closes, so that nothing is smoothed.
+    pub fn resolve(&self, point: usize, sum: f64, rho: f64, mu: f64) -> LawState {
+        if mu == 0.0 || !sum.is_finite() || self.is_bonded() {
+            return self.on_law(point, sum, rho);
+        }
+        let value = |gap: f64| {
+            let LawState { pressure, tangent, .. } = self.on_law(point, sum + gap, rho);
+            (gap * pressure, pressure + gap * tangent / (1.0 + tangent / rho))
+        };
+        let diagonal = sum.hypot(2.0 * (mu / rho).sqrt());
+        let rigid = if sum > 0.0 { 2.0 * mu / rho / (sum + diagonal) } else { 0.5 * (diagonal - sum) };
+        // With an infinite rho the gap of a closed point has no lower bound.
+        let start = if rigid > 0.0 { rigid } else { 1.0 };
+        let least = rigid * (1.0 - 4.0 * f64::EPSILON);
+        let (Ok(gap) | Err(gap)) = numeric::root(mu, [least, f64::MAX], start, value);
+        let LawState { compression, tangent, .. } = self.on_law(point, sum + gap, rho);
+        let pressure = mu / gap;
+        LawState { compression: compression - gap, pressure, tangent: (tangent.recip() + gap / pressure).recip() }
+    }
+
+    /// Return the state on the law itself with c + p/rho = `sum`.
+    fn on_law(&self, point: usize, sum: f64, rho: f64) -> LawState {
+        let compression = self.resolvent(point, sum, rho);
+        let (pressure, tangent) = self.pressure_and_tangent(point, compression);
+        LawState { compression, pressure, tangent }
+    }
 }
 
-/// Return [`LayerLaw::resolvent`] by a search for the root.
-fn search(law: &(impl LayerLaw + ?Sized), point: usize, s: f64, rho: f64) -> f64 {
-    // All comparisons are false for NaN, which is then returned as it is.
-    if !(s > 0.0 && s < f64::INFINITY && rho < f64::INFINITY) {
-        return s;
-    }
-    let sum = |c: f64| {
-        let (pressure, tangent) = law.pressure_and_tangent(point, c);
-        (c + pressure / rho, 1.0 + tangent / rho)
-    };
-    // A law that is NaN from some compression on has a rigid stop there.
-    let (Ok(c) | Err(c)) = numeric::root(s, [0.0, s], s, sum);
-    c
-}
-
-/// A law with a parameter that varies over the surface: one law for each contact point.
-#[derive(Debug)]
-pub struct PerPoint<L>(pub Vec<L>);
-
-impl<L: LayerLaw> LayerLaw for PerPoint<L> {
-    fn compressed(&self, point: usize, c: f64) -> Response {
-        self.0[point].compressed(0, c)
-    }
-
-    fn pressure(&self, point: usize, c: f64) -> f64 {
-        self.0[point].pressure(0, c)
-    }
-
-    fn pressure_and_tangent(&self, point: usize, c: f64) -> (f64, f64) {
-        self.0[point].pressure_and_tangent(0, c)
-    }
-
-    fn end(&self, point: usize) -> f64 {
-        self.0[point].end(0)
+/// Return p and p' of a law at c > 0, beyond its end along its tangent there.
+fn extended(law: &dyn LayerLaw, point: usize, c: f64) -> (f64, f64) {
+    let end = law.end(point);
+    if c > end {
+        let (pressure, tangent) = law.pressure_and_tangent(point, end);
+        (pressure + tangent * (c - end), tangent)
+    } else {
+        law.pressure_and_tangent(point, c)
     }
 }
 
@@ -191,54 +284,4 @@ pub struct LawState {
     pub pressure: f64,
     /// Tangent kappa = dp/dc.
     pub tangent: f64,
-}
-
-/// Return Minty's resolvent: the only state with c + p/rho = `sum` on the law smoothed by `mu`.
-///
-/// `mu` is an energy per area and `rho > 0` a stiffness per area. With `mu` = 0 the result is the state on the law
-/// itself.
-///
-/// Let c = phi(p) be the inverse of the law. The smoothed law, as on the central path of an interior-point method, is
-///
-/// ```text
-/// c = phi(p) - mu/p,   p > 0,        kappa = dp/dc = 1 / (phi'(p) + mu/p^2)
-/// ```
-///
-/// It is strictly monotone and has no corner. At every pressure p the gap s = mu/p remains, so that s p = mu, which is
-/// the perturbed complementarity condition.
-///
-/// The law need not be inverted. Let P(s) be the pressure at which the law itself meets the line with the sum s. A
-/// state with the remaining gap y = mu/p has p = P(`sum` + y), so y is the root of y P(`sum` + y) = mu, where the left
-/// side increases with y. The root is least for a rigid layer, P(s) = rho s, whose gap has a closed form.
-///
-/// A bonded layer neither opens nor closes, so that nothing is smoothed.
-pub fn resolve(law: &dyn LayerLaw, point: usize, sum: f64, rho: f64, mu: f64) -> LawState {
-    if mu == 0.0 || !sum.is_finite() || law.is_bonded() {
-        return on_law(law, point, sum, rho);
-    }
-    let value = |gap: f64| {
-        let LawState { pressure, tangent, .. } = on_law(law, point, sum + gap, rho);
-        (gap * pressure, pressure + gap * tangent / (1.0 + tangent / rho))
-    };
-    let diagonal = sum.hypot(2.0 * (mu / rho).sqrt());
-    let rigid = if sum > 0.0 { 2.0 * mu / rho / (sum + diagonal) } else { 0.5 * (diagonal - sum) };
-    // With an infinite rho the gap of a closed point has no lower bound.
-    let start = if rigid > 0.0 { rigid } else { 1.0 };
-    let least = rigid * (1.0 - 4.0 * f64::EPSILON);
-    let (Ok(gap) | Err(gap)) = numeric::root(mu, [least, f64::MAX], start, value);
-    let LawState { compression, tangent, .. } = on_law(law, point, sum + gap, rho);
-    let pressure = mu / gap;
-    LawState { compression: compression - gap, pressure, tangent: (tangent.recip() + gap / pressure).recip() }
-}
-
-/// Return the state on the law itself with c + p/rho = `sum`.
-fn on_law(law: &dyn LayerLaw, point: usize, sum: f64, rho: f64) -> LawState {
-    let compression = law.resolvent(point, sum, rho);
-    let (pressure, tangent) = if compression > 0.0 {
-        law.pressure_and_tangent(point, compression)
-    } else {
-        let Response { pressure, tangent, .. } = law.response(point, compression);
-        (pressure, tangent)
-    };
-    LawState { compression, pressure, tangent }
 }

@@ -1,6 +1,6 @@
 //! The law given by a curve: a smooth increasing one through measured points.
 
-use super::{LayerLaw, Response};
+use super::LayerLaw;
 use crate::linalg::portable::hypot;
 
 /// A monotone piecewise cubic curve through (0, 0) and points (c, p), continued as a straight line beyond the last one.
@@ -45,9 +45,19 @@ impl Table {
             }
         }
         for i in 0..secants.len() {
-            knots[i + 1].energy = piece(&knots[i], &knots[i + 1], knots[i + 1].c).energy;
+            knots[i + 1].energy = piece(&knots[i], &knots[i + 1], knots[i + 1].c)[2];
         }
         Self { knots }
+    }
+
+    /// Return p, p' and P at a compression up to the last knot. NaN is evaluated in the first piece and stays NaN.
+    fn at(&self, c: f64) -> [f64; 3] {
+        let above = self.knots.partition_point(|knot| knot.c <= c).max(1);
+        let before = &self.knots[above - 1];
+        match self.knots.get(above) {
+            Some(next) => piece(before, next, c),
+            None => [before.pressure, before.slope, before.energy],
+        }
     }
 }
 
@@ -55,36 +65,29 @@ fn secants(knots: &[Knot]) -> Vec<f64> {
     knots.windows(2).map(|two| (two[1].pressure - two[0].pressure) / (two[1].c - two[0].c)).collect()
 }
 
-impl Knot {
-    fn response(&self) -> Response {
-        Response { pressure: self.pressure, tangent: self.slope, energy: self.energy }
-    }
-}
-
-/// Return the response of the curve between two knots at compression `c`.
-fn piece(a: &Knot, b: &Knot, c: f64) -> Response {
+/// Return p, p' and P of the curve between two knots at compression `c`.
+fn piece(a: &Knot, b: &Knot, c: f64) -> [f64; 3] {
     let h = b.c - a.c;
     let s = (c - a.c) / h;
     // In the local coordinate s the pressure is p = p_a + h s (m_a + s (f + s g)), where m_a is the slope at knot a.
     let secant = (b.pressure - a.pressure) / h;
     let f = 3.0 * secant - 2.0 * a.slope - b.slope;
     let g = a.slope + b.slope - 2.0 * secant;
-    Response {
-        pressure: a.pressure + h * s * (a.slope + s * (f + s * g)),
-        tangent: a.slope + s * (2.0 * f + 3.0 * s * g),
-        energy: a.energy + h * s * (a.pressure + h * s * (a.slope / 2.0 + s * (f / 3.0 + s * g / 4.0))),
-    }
+    [
+        a.pressure + h * s * (a.slope + s * (f + s * g)),
+        a.slope + s * (2.0 * f + 3.0 * s * g),
+        a.energy + h * s * (a.pressure + h * s * (a.slope / 2.0 + s * (f / 3.0 + s * g / 4.0))),
+    ]
 }
 
 impl LayerLaw for Table {
-    fn compressed(&self, _point: usize, c: f64) -> Response {
-        // NaN is evaluated in the first piece and stays NaN.
-        let above = self.knots.partition_point(|knot| knot.c < c).max(1);
-        let before = &self.knots[above - 1];
-        match self.knots.get(above) {
-            Some(next) => piece(before, next, c),
-            None => before.response().straight(c - before.c),
-        }
+    fn pressure_and_tangent(&self, _point: usize, c: f64) -> (f64, f64) {
+        let [pressure, tangent, _] = self.at(c);
+        (pressure, tangent)
+    }
+
+    fn energy(&self, _point: usize, c: f64) -> f64 {
+        self.at(c)[2]
     }
 
     fn end(&self, _point: usize) -> f64 {

@@ -212,15 +212,15 @@ pub(super) struct Rays<const D: usize> {
 impl<const D: usize> Rays<D> {
     /// Return the normals of a facet. They reach behind it and before it by the lengths `ends`.
     pub fn of(facet: &Facet<D>, ends: [f64; 2]) -> Self {
-        let (axis, ball) = (unit(mean(&facet.normals)), Ball::around(&facet.x));
+        let (axis, (middle, radius)) = (unit(mean(&facet.normals)), ball(&facet.x));
         let spread = |normal: &[f64; D]| {
             let along = dot(normal, &axis);
             let off: [f64; D] = std::array::from_fn(|c| normal[c] - along * axis[c]);
             if along > 0.0 { length(off) / along } else { f64::INFINITY }
         };
         Self {
-            middle: std::array::from_fn(|c| facet.from[c] + ball.center[c]),
-            radius: ball.radius,
+            middle: plus(facet.from, middle),
+            radius,
             axis,
             spread: facet.normals.iter().map(spread).fold(0.0, f64::max),
             ends,
@@ -229,12 +229,9 @@ impl<const D: usize> Rays<D> {
 
     /// Return whether a normal may meet the convex hull of points.
     pub fn may_meet(&self, points: &[[f64; D]]) -> bool {
-        self.may_enter(&Ball::around(points))
-    }
-
-    fn may_enter(&self, ball: &Ball<D>) -> bool {
-        let away = minus(ball.center, self.middle);
-        let (along, reach) = (dot(&away, &self.axis), self.radius + ball.radius);
+        let (center, radius) = ball(points);
+        let away = minus(center, self.middle);
+        let (along, reach) = (dot(&away, &self.axis), self.radius + radius);
         let off = length::<D>(std::array::from_fn(|c| away[c] - along * self.axis[c]));
         let [behind, before] = self.ends;
         -along <= behind + reach && along <= before + reach && off <= reach + self.spread * (along.abs() + reach)
@@ -255,17 +252,10 @@ pub(super) fn plus<const D: usize>(a: [f64; D], b: [f64; D]) -> [f64; D] {
     std::array::from_fn(|c| a[c] + b[c])
 }
 
-struct Ball<const D: usize> {
-    center: [f64; D],
-    radius: f64,
-}
-
-impl<const D: usize> Ball<D> {
-    /// Return a ball around points: around the middle of all.
-    fn around(points: &[[f64; D]]) -> Self {
-        let center = mean(points);
-        Self { center, radius: points.iter().map(|&x| length(minus(x, center))).fold(0.0, f64::max) }
-    }
+/// Return the center and the radius of a ball around points: around the middle of all.
+fn ball<const D: usize>(points: &[[f64; D]]) -> ([f64; D], f64) {
+    let center = mean(points);
+    (center, points.iter().map(|&x| length(minus(x, center))).fold(0.0, f64::max))
 }
 
 fn mean<const D: usize>(points: &[[f64; D]]) -> [f64; D] {

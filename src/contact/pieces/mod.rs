@@ -9,48 +9,33 @@ mod facet;
 mod plane;
 mod space;
 
+pub use super::point::IntegrationPoint;
 pub use plane::in_plane;
 pub use space::in_space;
 
+use super::basis::PressureBasis;
 use super::side::Side;
 use crate::fem::{area_vector, element, length, minus};
 use crate::linalg::{around, dot};
-use crate::problem::order::Order;
 use facet::{Facet, Rays, plus};
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
-
-/// An integration point that both surfaces share.
-#[derive(Debug, Clone, Copy)]
-pub struct IntegrationPoint<const D: usize> {
-    /// Facet of side a.
-    pub facet_a: usize,
-    /// Barycentric coordinates in this facet.
-    pub at_a: [f64; D],
-    /// Facet of side b.
-    pub facet_b: usize,
-    /// Barycentric coordinates there of the projection along the normal of side a.
-    pub at_b: [f64; D],
-    /// Length (area) that belongs to the point, measured on side a; in bodies of revolution the area of a ring.
-    pub weight: f64,
-    /// Distance to the projection, negative where the surfaces overlap.
-    pub gap: f64,
-}
 
 /// The common pieces of two surfaces.
 #[derive(Debug, Clone, Default)]
 pub struct Intersection<const D: usize> {
     /// Integration points of the common pieces, grouped by facet of side a.
     pub points: Vec<IntegrationPoint<D>>,
-    /// What was refused before each facet of side a.
-    pub refused: Vec<Refused>,
+    /// What was found before each facet of side a.
+    pub cover: Vec<Coverage>,
 }
 
 impl<const D: usize> Intersection<D> {
     /// Return the facets of both sides that face each other, but are too far apart.
     pub fn far(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
-        self.refused.iter().enumerate().flat_map(|(i, refused)| refused.far.iter().map(move |&j| (i, j)))
+        self.cover.iter().enumerate().flat_map(|(i, cover)| cover.far.iter().map(move |&j| (i, j)))
     }
 }
 
@@ -58,12 +43,8 @@ impl<const D: usize> Intersection<D> {
     /// Return the integration points of all facets of a side that is before a rigid obstacle. The obstacle has the
     /// facets of the side itself, at no distance, so that its forces are the opposite ones.
     pub fn of_one(a: &Side<D>) -> Self {
-        let degree = match (D, a.facets.order) {
-            (2, order) => 2 * order.degree() + 3,
-            (_, Order::P1) => 2,
-            _ => 5,
-        };
-        let rule = element::rule(D, degree);
+        let order = a.facets.order;
+        let rule = if D == 2 { element::rule(2, 2 * order.degree() + 3) } else { element::rule_of_products(D, order) };
         let mut points = Vec::new();
         for facet in 0..a.facets.count() {
             let x = a.facets.coordinates(facet, a.space);
@@ -74,7 +55,7 @@ impl<const D: usize> Intersection<D> {
                 points.push(IntegrationPoint { facet_a: facet, at_a: at, facet_b: facet, at_b: at, weight, gap: 0.0 });
             }
         }
-        Self { points, refused: vec![Refused::default(); a.facets.count()] }
+        Self { points, cover: vec![Coverage { ends: [0.0, 1.0], ..Coverage::default() }; a.facets.count()] }
     }
 
     /// Take the surfaces as touching everywhere.
@@ -103,15 +84,38 @@ pub struct Reach {
     pub facing: f64,
 }
 
-/// What lies before a facet of side a and is no partner.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Refused {
+/// What lies before a facet of side a.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Coverage {
+    /// Its length (area), in bodies of revolution the area of a ring.
+    pub measure: f64,
+    /// Share of it that is paired.
+    pub share: f64,
+    /// Ends of the part of an edge that is paired, from 0 to 1 along it.
+    pub ends: [f64; 2],
+    /// Its pressure functions, if it is paired at all. They do not go from rank to rank.
+    #[serde(skip)]
+    pub basis: Option<PressureBasis>,
     /// Facets of side b whose distance is too large.
     pub far: BTreeSet<usize>,
     /// Whether facets of side b within the limits of distance are inclined by too much.
     pub is_inclined: bool,
-    /// Number of pieces and of points of pieces that the search has lost.
+    /// Number of pieces and of points of pieces that the search has lost, if it is not fully paired.
     pub lost: usize,
+}
+
+impl Default for Coverage {
+    fn default() -> Self {
+        Self {
+            measure: 0.0,
+            share: 0.0,
+            ends: [1.0, 0.0],
+            basis: None,
+            far: BTreeSet::new(),
+            is_inclined: false,
+            lost: 0,
+        }
+    }
 }
 
 impl Reach {
@@ -148,7 +152,17 @@ impl Reach {
     }
 }
 
-impl Refused {
+impl Coverage {
+    /// Return whether the facet is fully paired.
+    pub fn is_whole(&self) -> bool {
+        self.share > WHOLE
+    }
+
+    /// Return whether facets of side b lie before it that are too far away or inclined by too much.
+    pub fn is_cut_short(&self) -> bool {
+        self.is_inclined || !self.far.is_empty()
+    }
+
     /// Return whether `reach` admits facet `index` of side b at this distance, where a facet of side a has one of these
     /// unit `normals` and the other one is its own. Note it if it is too far away.
     fn admits<const D: usize>(&mut self, reach: &Reach, index: usize, gap: f64, normals: [[f64; D]; 2]) -> bool {
@@ -189,7 +203,7 @@ impl<const D: usize> BoxTree<D> {
         self.tree.locate_in_envelope_intersecting(near).map(|candidate| candidate.data)
     }
 
-    /// Return the pieces of a facet of side a that `facing` makes of facets of side b, and note in `refused` why others
+    /// Return the pieces of a facet of side a that `facing` makes of facets of side b, and note in `cover` why others
     /// are none.
     ///
     /// Facets that normals meet within twice the distance of the nearest one and the size of the facet are tried first,
@@ -200,8 +214,8 @@ impl<const D: usize> BoxTree<D> {
         &self,
         facet: &Facet<D>,
         reach: &Reach,
-        refused: &mut Refused,
-        facing: impl Fn(&[usize], &mut Refused) -> Vec<P>,
+        cover: &mut Coverage,
+        facing: impl Fn(&[usize], &mut Coverage) -> Vec<P>,
     ) -> Vec<P> {
         let met = |ends: [f64; 2]| -> Vec<usize> {
             self.tree.locate_with_selection_function(Rays::of(facet, ends)).map(|candidate| candidate.data).collect()
@@ -212,14 +226,14 @@ impl<const D: usize> BoxTree<D> {
         let [from, to] = [nearest.geom().lower(), nearest.geom().upper()].map(|corner| minus(corner, middle));
         let away: [f64; D] = std::array::from_fn(|c| from[c].abs().max(to[c].abs()));
         let height = 2.0 * (length(away) + facet.size);
-        let pieces = facing(&met([reach.overlap.min(height), reach.gap.min(height)]), refused);
+        let pieces = facing(&met([reach.overlap.min(height), reach.gap.min(height)]), cover);
         if !pieces.is_empty() {
             return pieces;
         }
-        let mut farther = Refused::default();
+        let mut farther = Coverage::default();
         let pieces = facing(&met([reach.overlap, reach.farthest]), &mut farther);
-        refused.far.append(&mut farther.far);
-        refused.is_inclined |= farther.is_inclined;
+        cover.far.append(&mut farther.far);
+        cover.is_inclined |= farther.is_inclined;
         pieces
     }
 }
@@ -241,10 +255,10 @@ mod tests {
             (1.0, steep, false, false),
             (3.0, steep, false, false),
         ] {
-            let mut refused = Refused::default();
-            assert_eq!(refused.admits(&reach, 7, gap, [up, other]), admitted, "{gap} {other:?}");
-            assert_eq!(refused.far.contains(&7), is_far, "{gap} {other:?}");
-            assert_eq!(refused.is_inclined, gap == 1.0 && other == steep, "{gap} {other:?}");
+            let mut cover = Coverage::default();
+            assert_eq!(cover.admits(&reach, 7, gap, [up, other]), admitted, "{gap} {other:?}");
+            assert_eq!(cover.far.contains(&7), is_far, "{gap} {other:?}");
+            assert_eq!(cover.is_inclined, gap == 1.0 && other == steep, "{gap} {other:?}");
         }
         assert!(!reach.faces(up, up) && !reach.faces(up, [0.9, -0.4]) && reach.faces(up, [0.8, -0.6]));
     }

@@ -1,7 +1,7 @@
 //! Common pieces of two plane curves: intervals of the facets of side a.
 
 use super::facet::{Facet, Lost, Rays, SNAP, plus};
-use super::{BoxTree, IntegrationPoint, Intersection, Reach, Refused};
+use super::{BoxTree, Coverage, IntegrationPoint, Intersection, Reach};
 use crate::contact::side::Side;
 use crate::fem::{element, length, minus};
 use crate::linalg::dot;
@@ -16,26 +16,29 @@ pub fn in_plane(a: &Side<2>, b: &Side<2>, reach: &Reach) -> Intersection<2> {
     let search = BoxTree::new(b);
     // products of functions of both sides, and one degree more for curved facets
     let rule = element::gauss((a.facets.order.degree() + b.facets.order.degree() + 3) / 2 + 1);
-    let mut common = Intersection { points: Vec::new(), refused: vec![Refused::default(); a.facets.count()] };
+    let mut common = Intersection { points: Vec::new(), cover: vec![Coverage::default(); a.facets.count()] };
     for i in 0..a.facets.count() {
         let facet = Facet::of(a, i);
-        let refused = &mut common.refused[i];
-        let pieces = search.pieces(&facet, reach, refused, |near, refused| facing(&facet, b, near, reach, refused));
+        let cover = &mut common.cover[i];
+        let pieces = search.pieces(&facet, reach, cover, |near, cover| facing(&facet, b, near, reach, cover));
         for (low, high, FacetSegment { index, other, .. }) in nearest(&pieces) {
             let offset = minus(facet.from, other.from);
-            for &(position, weight) in &rule {
+            for (k, &(position, weight)) in rule.iter().enumerate() {
                 let s = low + (high - low) * position;
                 let (on_a, normal) = (facet.at(&place(s)), facet.normal(&place(s)));
                 let Ok(Some((at_b, t))) = other.hit(plus(on_a, offset), normal, ON_FACET) else {
                     // The normals on both sides of this point hit the facet, so this one is lost.
-                    refused.lost += 1;
+                    cover.lost += 1;
                     continue;
                 };
                 let gap = t * length(normal);
                 if !reach.holds(gap) {
-                    refused.far.insert(*index);
+                    cover.far.insert(*index);
                     continue;
                 }
+                // a piece of which points are too far apart ends at its last point that is not
+                let [from, to] = [if k == 0 { low } else { s }, if k + 1 == rule.len() { high } else { s }];
+                cover.ends = [cover.ends[0].min(from), cover.ends[1].max(to)];
                 common.points.push(IntegrationPoint {
                     facet_a: i,
                     at_a: place(s),
@@ -53,18 +56,18 @@ pub fn in_plane(a: &Side<2>, b: &Side<2>, reach: &Reach) -> Intersection<2> {
     common
 }
 
-/// Return the pieces of a facet of side a that face facets of side b, the nearest first. Note in `refused` why others
+/// Return the pieces of a facet of side a that face facets of side b, the nearest first. Note in `cover` why others
 /// are none.
-fn facing(facet: &Facet<2>, b: &Side<2>, near: &[usize], reach: &Reach, refused: &mut Refused) -> Vec<FacetSegment> {
+fn facing(facet: &Facet<2>, b: &Side<2>, near: &[usize], reach: &Reach, cover: &mut Coverage) -> Vec<FacetSegment> {
     let mut pieces: Vec<FacetSegment> = Vec::new();
     for &index in near {
         let other = Facet::of(b, index);
         let directions = [facet.direction, other.direction];
         match FacetSegment::between(facet, other, index) {
-            Ok(piece) => pieces.extend(piece.filter(|p| refused.admits(reach, index, p.gap, directions))),
+            Ok(piece) => pieces.extend(piece.filter(|p| cover.admits(reach, index, p.gap, directions))),
             Err(Lost) => {
                 let is_met = Rays::of(facet, [f64::INFINITY; 2]).may_meet(&b.facets.coordinates(index, b.space));
-                refused.lost += usize::from(is_met && reach.faces(directions[0], directions[1]));
+                cover.lost += usize::from(is_met && reach.faces(directions[0], directions[1]));
             }
         }
     }

@@ -8,7 +8,7 @@
 //! further where corners of some have no image.
 
 use super::facet::{Facet, Lost, Rays, SNAP, plus};
-use super::{BoxTree, IntegrationPoint, Intersection, Reach, Refused, WHOLE};
+use super::{BoxTree, Coverage, IntegrationPoint, Intersection, Reach, WHOLE};
 use crate::contact::side::Side;
 use crate::fem::{area_vector, element, length, minus};
 use crate::linalg::dot;
@@ -34,14 +34,12 @@ const PARTS: [usize; 4] = [1, 2, 4, 8];
 pub fn in_space(a: &Side<3>, b: &Side<3>, reach: &Reach) -> Intersection<3> {
     let search = BoxTree::new(b);
     let facets_b: Vec<Facet<3>> = (0..b.facets.count()).map(|i| Facet::of(b, i)).collect();
-    let quadratic = a.facets.order == Order::P2 || b.facets.order == Order::P2;
-    let rule = element::rule(3, if quadratic { 5 } else { 2 });
-    let mut common = Intersection { refused: vec![Refused::default(); a.facets.count()], ..Intersection::default() };
+    let rule = element::rule_of_products(3, a.facets.order.max(b.facets.order));
+    let mut common = Intersection { points: Vec::new(), cover: vec![Coverage::default(); a.facets.count()] };
     for i in 0..a.facets.count() {
         let facet = Facet::of(a, i);
-        let refused = &mut common.refused[i];
-        let pieces =
-            search.pieces(&facet, reach, refused, |near, refused| facing(&facet, &facets_b, near, reach, refused));
+        let cover = &mut common.cover[i];
+        let pieces = search.pieces(&facet, reach, cover, |near, cover| facing(&facet, &facets_b, near, reach, cover));
         for FacetPolygon { polygon, index, .. } in pieces {
             let other = &facets_b[index];
             let offset = minus(facet.from, other.from);
@@ -52,13 +50,13 @@ pub fn in_space(a: &Side<3>, b: &Side<3>, reach: &Reach) -> Intersection<3> {
                     let normal = facet.normal(&at_a);
                     let Ok(Some((at_b, t))) = other.hit(plus(facet.at(&at_a), offset), normal, ON_FACET) else {
                         // The point lies under the image of this very facet, so it is lost.
-                        refused.lost += 1;
+                        cover.lost += 1;
                         continue;
                     };
                     let weight = weight * share * length(area_vector(facet.order, &facet.x, &at_a));
                     let gap = t * length(normal);
                     if !reach.holds(gap) {
-                        refused.far.insert(index);
+                        cover.far.insert(index);
                         continue;
                     }
                     common.points.push(IntegrationPoint { facet_a: i, at_a, facet_b: index, at_b, weight, gap });
@@ -82,11 +80,11 @@ fn without_overlaps(pieces: Vec<FacetPolygon>) -> Vec<FacetPolygon> {
 }
 
 /// Return the pieces of a facet of side a that face these facets of side b, without what nearer ones cover. Note in
-/// `refused` why others are none.
-fn facing(facet: &Facet<3>, b: &[Facet<3>], near: &[usize], reach: &Reach, refused: &mut Refused) -> Vec<FacetPolygon> {
+/// `cover` why others are none.
+fn facing(facet: &Facet<3>, b: &[Facet<3>], near: &[usize], reach: &Reach, cover: &mut Coverage) -> Vec<FacetPolygon> {
     let mut pieces = Vec::new();
     for parts in PARTS {
-        let before = refused.clone();
+        let before = cover.clone();
         let mut found = Vec::new();
         let mut without_image = 0;
         for &index in near {
@@ -94,9 +92,9 @@ fn facing(facet: &Facet<3>, b: &[Facet<3>], near: &[usize], reach: &Reach, refus
             let clipped = Clipped::between(facet, other, index, parts);
             if reach.faces(facet.direction, other.direction) {
                 without_image += clipped.without_image;
-                refused.lost += clipped.lost;
+                cover.lost += clipped.lost;
             }
-            let admitted = |p: &FacetPolygon| refused.admits(reach, p.index, p.gap, [facet.direction, other.direction]);
+            let admitted = |p: &FacetPolygon| cover.admits(reach, p.index, p.gap, [facet.direction, other.direction]);
             found.extend(clipped.pieces.into_iter().filter(admitted));
         }
         found.sort_by(|p, q| p.gap.abs().total_cmp(&q.gap.abs()).then(p.index.cmp(&q.index)));
@@ -105,7 +103,7 @@ fn facing(facet: &Facet<3>, b: &[Facet<3>], near: &[usize], reach: &Reach, refus
         if without_image == 0 || covered >= 0.5 * WHOLE || parts == PARTS[PARTS.len() - 1] {
             break;
         }
-        *refused = before;
+        *cover = before;
     }
     pieces
 }
