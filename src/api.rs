@@ -48,11 +48,11 @@ pub use crate::output::{BodyField, CellKind, ContactTable, PairReport, Report};
 pub use crate::petsc::Session;
 pub use crate::problem::{
     AxesSpec, BodySpec, Constants, ContactSpec, ElasticitySpec, Gamma, GroupArrays, History, LayerSpec, Linear, Load,
-    LoadKind, LoadStep, MeshArrays, MeshSource, MethodName, MethodSpec, Order, Orthotropic, Overlap, Plane, Preset,
-    RegionSpec, RobinRule, SolverSpec, SpringKind, SpringSpec, Start, StopRule, Support, Units, Zone,
+    LoadKind, LoadStep, MeshArrays, MeshSource, MethodName, MethodSpec, OneOrVector, Order, Orthotropic, Overlap,
+    Plane, Preset, RegionSpec, RobinRule, SolverSpec, SpringSpec, Start, StopRule, Support, Units, Vector, Zone,
 };
 pub use crate::run::recorder::Recorder;
-pub use crate::scene::{AdaptSpec, Most, OutputSpec, Precision, Quantity, Scene, load};
+pub use crate::scene::{AdaptSpec, OutputSpec, Precision, Quantity, Scene, load};
 
 use crate::estimate::Estimate;
 use crate::interrupt::Interrupt;

@@ -255,6 +255,20 @@ impl Error {
         self
     }
 
+    /// Return message, label, span and advice as one text, for a library whose errors are texts.
+    pub fn packed(&self) -> String {
+        let span = self.0.place.as_ref().map(|place| place.span.clone());
+        serde_json::json!([self.0.message, self.0.label, span, self.0.help]).to_string()
+    }
+
+    /// Return the error about the scene that was [packed](Self::packed), without its place, and its span; `None` for
+    /// any other text.
+    pub fn unpacked(text: &str) -> Option<(Self, Option<Range<usize>>)> {
+        let (message, label, span, help): (String, String, _, _) = serde_json::from_str(text).ok()?;
+        let error = Self::new(Kind::Scene, message).label(label);
+        Some((Self(Box::new(ErrorData { help, ..*error.0 })), span))
+    }
+
     /// Return the kind.
     pub fn kind(&self) -> Kind {
         self.0.kind

@@ -36,6 +36,12 @@ pub struct Expression {
 const COORDINATES: [&str; 4] = ["x", "y", "z", "k"];
 
 impl Expression {
+    /// Return an expression that is not parsed yet; its value is NaN. `place` is that of [`Expression::parse`].
+    pub fn uncompiled(text: &str, place: Place) -> Self {
+        let program = Arc::new(Program::new(vec![Operation::Number(f64::NAN)]));
+        Self { program, variables: [].into(), text: text.into(), place }
+    }
+
     /// Parse a text, which stands at `place` with or without the quotes of a TOML string.
     ///
     /// A name that is not in the scope is refused, with a caret at the name. Files of data are read when the first
@@ -184,6 +190,11 @@ impl Field {
     /// expression is not defined.
     pub fn eval(&self, x: [f64; 3]) -> f64 {
         self.eval_at(x, f64::NAN)
+    }
+
+    /// Return the value of a field that depends on nothing; NaN of any other.
+    pub fn number(&self) -> f64 {
+        self.eval([f64::NAN; 3])
     }
 
     /// Return the value at a point in iteration `k`.

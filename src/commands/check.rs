@@ -1,6 +1,6 @@
 //! `winkler check`: build the problem of a scene and print what it has, without solving it.
 
-use super::{SceneArgs, clock_with_phases, load};
+use super::{SceneArgs, clock_with_phases};
 use crate::contact::ContactPair;
 use crate::discretize::BodyInfo;
 use crate::error::Result;
@@ -28,12 +28,12 @@ pub struct CheckArgs {
 /// Refusals of scene and mesh.
 pub fn check(session: &Session, interrupt: &Interrupt, request: &CheckArgs) -> Result<i32> {
     let mut clock = clock_with_phases(session.rank() == 0 && !request.scene.json);
-    let mut scene = load(session, &request.scene.scene, &request.scene.overrides())?;
+    let mut scene = request.scene.load(session)?;
     let settings = scene.settings();
     if scene.method.steps.is_table() {
-        Rc::make_mut(&mut scene).method.steps = scene.method.steps.heaviest();
+        scene.method.steps = scene.method.steps.heaviest();
     }
-    let built = run::build(session, scene, interrupt, &mut clock)?;
+    let built = run::build(session, Rc::new(scene), interrupt, &mut clock)?;
     // nothing is solved, so that no line may name a next phase
     clock.watch = None;
     clock.total();

@@ -26,7 +26,7 @@ use crate::petsc::Session;
 use crate::problem::MethodName;
 use crate::run::report::{GatheredCounters, solvers_in_words};
 use crate::run::{self, Clock, Prepared};
-use crate::scene::Scene;
+use crate::scene::{Flags, Scene};
 use clap::Args;
 use std::cell::RefCell;
 use std::ffi::OsStr;
@@ -112,34 +112,22 @@ pub struct SceneArgs {
     /// Replace a key of the scene, for example method.gamma=0.3 or contact.0.layer.power.a=0.3; may be repeated
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Method: auto, robin, newton-robin, newton or semismooth (short for --set method.name=NAME)
-    #[arg(long, value_name = "NAME")]
-    method: Option<String>,
-    /// Estimate the error of the discretisation (short for --set estimate=true)
-    #[arg(long)]
-    estimate: bool,
-    /// Adapt the mesh until the estimated errors of pressures and displacements, or of what adapt.of says, are at most
-    /// this (short for --set adapt.error=E)
-    #[arg(long, value_name = "E", allow_hyphen_values = true)]
-    tolerance: Option<String>,
+    #[command(flatten)]
+    flags: Flags,
     /// Print the report as JSON
     #[arg(long)]
     pub json: bool,
 }
 
 impl SceneArgs {
-    /// Return all overrides of the scene, those with an option of their own last.
-    pub fn overrides(&self) -> Vec<String> {
-        let method = self.method.iter().map(|name| format!("--method {name}"));
-        let tolerance = self.tolerance.iter().map(|error| format!("--tolerance {error}"));
-        let flags = flags([(self.estimate, "--estimate")]);
-        self.overrides.iter().cloned().chain(method).chain(tolerance).chain(flags).collect()
+    /// Read the scene, whose text the first rank sends to all. A refusal is printed once.
+    ///
+    /// # Errors
+    /// Refusals of the scene.
+    fn load(&self, session: &Session) -> Result<Scene> {
+        let text = text_of(session, &self.scene)?;
+        collectively(session, crate::scene::parse(&self.scene, text, &self.overrides, &self.flags))
     }
-}
-
-/// Return those of the flags that the user typed.
-fn flags<const N: usize>(all: [(bool, &str); N]) -> impl Iterator<Item = String> {
-    all.into_iter().filter(|(given, _)| *given).map(|(_, flag)| flag.to_owned())
 }
 
 /// Return the folder of results: that of `-o`, else that of the scene, else `results/<case>`.
@@ -152,7 +140,7 @@ pub fn folder_of(scene: &Scene, typed: Option<&PathBuf>) -> PathBuf {
 
 /// Return the files that a scene is read from.
 pub fn inputs(scene: &Scene) -> Vec<PathBuf> {
-    let data = scene.data.values().map(|data| data.spec.file.clone());
+    let data = scene.data.values().map(|data| data.spec.file.value.clone());
     let table = scene.method.steps.table.iter().map(|table| table.value.clone());
     data.chain(table).chain([scene.path.clone()]).chain(crate::mesh::files(&scene.mesh)).collect()
 }
@@ -164,15 +152,6 @@ fn case_of(path: &Path) -> &OsStr {
         Some(folder) if stem == "scene" => folder,
         _ => stem,
     }
-}
-
-/// Read a scene, whose text the first rank sends to all. A refusal is printed once.
-///
-/// # Errors
-/// Refusals of the scene.
-pub fn load(session: &Session, path: &Path, overrides: &[String]) -> Result<Rc<Scene>> {
-    let text = text_of(session, path)?;
-    collectively(session, crate::scene::parse(path, text, overrides)).map(Rc::new)
 }
 
 /// Return the text of a scene file as the first rank reads it.

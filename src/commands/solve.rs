@@ -5,7 +5,7 @@ use super::checkpoint::{self, Checkpoint};
 use super::plots::unit_words;
 use super::shortfall::Shortfall;
 use super::write::{ResultFiles, planned, planned_on_mesh, to_json, write_fields};
-use super::{SceneArgs, Terminal, VerbosityArgs, clock_with_phases, flags, folder_of, inputs, load};
+use super::{SceneArgs, Terminal, VerbosityArgs, clock_with_phases, folder_of, inputs};
 use crate::ddm::{Observer, Row, Status};
 use crate::error::{Error, Result};
 use crate::estimate::Estimate;
@@ -45,13 +45,6 @@ pub struct SolveArgs {
     verbosity: VerbosityArgs,
 }
 
-impl SolveArgs {
-    fn overrides(&self) -> Vec<String> {
-        let flags = flags([(self.vtu, "--vtu"), (self.msh, "--msh"), (self.report, "--report")]);
-        self.scene.overrides().into_iter().chain(flags).collect()
-    }
-}
-
 /// Solve a scene, write its results and return the exit code.
 ///
 /// # Errors
@@ -60,7 +53,11 @@ impl SolveArgs {
 pub fn solve(session: &Session, interrupt: &Interrupt, request: &SolveArgs) -> Result<i32> {
     let terminal = Terminal::new(session, &request.scene, &request.verbosity);
     let mut clock = clock_with_phases(terminal.is_loud());
-    let scene = load(session, &request.scene.scene, &request.overrides())?;
+    let mut scene = request.scene.load(session)?;
+    scene.output.vtu |= request.vtu;
+    scene.output.msh |= request.msh;
+    scene.output.report |= request.report;
+    let scene = Rc::new(scene);
     let read = |folder: &PathBuf| Checkpoint::read(&Ranks::new(session), folder);
     let checkpoint = collectively(session, request.restart.as_ref().map(read).transpose())?;
     let folder = collectively(

@@ -48,8 +48,8 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &SweepArgs) -> R
     let text = super::text_of(session, &request.scene.scene)?;
     let load = |case: &Case| {
         let own = case.overrides.iter().map(|text| format!("--over {text}"));
-        let overrides: Vec<String> = request.scene.overrides().into_iter().chain(own).collect();
-        crate::scene::parse(&case.scene, text.clone(), &overrides).map(Rc::new)
+        let overrides: Vec<String> = request.scene.overrides.iter().cloned().chain(own).collect();
+        crate::scene::parse(&case.scene, text.clone(), &overrides, &request.scene.flags).map(Rc::new)
     };
     let scenes = plan.cases.iter().map(load).collect::<Result<Vec<Rc<Scene>>>>();
     let scenes = collectively(session, scenes.and_then(without_adaptation))?;
@@ -189,7 +189,7 @@ impl Sweep<'_> {
         if self.terminal.is_loud() || (!self.terminal.json && verdict::exit_code(done) != 0) {
             self.bar.suspend(|| say(row.line(&case.label)))?;
         }
-        let most = scene.output.pairs.map_or(LISTED, |most| most.0);
+        let most = scene.output.pairs.unwrap_or(LISTED);
         let shown = self.shown.get_or_insert_with(|| busiest(&report.pairs, most));
         self.plots.add(&case.label, done, shown);
         self.reports.push(report);

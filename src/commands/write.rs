@@ -51,7 +51,7 @@ impl ResultFiles<'_> {
         report.discretization_error = self.estimate.map(report::discretization_error);
         report.rounds.clone_from(&self.plan.rounds);
         change(&mut report);
-        let shown = busiest(&report.pairs, output.pairs.map_or(LISTED, |most| most.0));
+        let shown = busiest(&report.pairs, output.pairs.unwrap_or(LISTED));
         report.left_out = left_out(&report.pairs, &shown);
         let mut plots = Plots::default();
         plots.add("pressure", done, &shown);

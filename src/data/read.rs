@@ -24,7 +24,7 @@ const PREPARE: &str =
 /// # Errors
 /// A file that cannot be read, that is damaged, or that has a number that is not finite.
 pub fn rows(spec: &DataSpec) -> Result<NumberRows> {
-    let bytes = crate::file::read(&spec.file).map_err(|error| error.at(&spec.place))?;
+    let bytes = crate::file::read(&spec.file).map_err(|error| error.at(&spec.file.place))?;
     let rows = match bytes.strip_prefix(b"\x93NUMPY") {
         Some(rest) => of_numpy(spec, rest)?,
         None => of_text(spec, &with_unix_lines(bytes))?,

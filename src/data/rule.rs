@@ -1,6 +1,6 @@
 //! The settings of data in a scene, and the values that data give.
 
-use crate::error::{Error, Place};
+use crate::error::{Error, Located};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt::Display;
@@ -62,10 +62,7 @@ pub struct DataSpec {
     #[serde(skip)]
     pub name: String,
     /// The file.
-    pub file: PathBuf,
-    /// The place in the scene where the file is named.
-    #[serde(skip)]
-    pub place: Place,
+    pub file: Located<PathBuf>,
     /// Place of the first height.
     pub origin: [f64; 2],
     /// Distance of heights along a row and from row to row.
@@ -84,7 +81,7 @@ pub struct DataSpec {
 impl DataSpec {
     /// Return a refusal of the file. `what` continues the message "data `name`: file"; `help` is the advice.
     pub(super) fn refuse(&self, what: impl Display, help: &str) -> Error {
-        let Self { name, file, place, .. } = self;
-        Error::scene(place, format!("data `{name}`: {} {what}", file.display())).help(help)
+        let Self { name, file, .. } = self;
+        Error::scene(&file.place, format!("data `{name}`: {} {what}", file.display())).help(help)
     }
 }

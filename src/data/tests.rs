@@ -1,13 +1,12 @@
 use super::*;
-use crate::error::{Place, Result, Source};
+use crate::error::{Located, Place, Result, Source};
 use std::sync::Arc;
 
 fn spec(file: &std::path::Path) -> DataSpec {
     let source = Source { name: "scene.toml".into(), text: "file = \"heights\"".into() };
     DataSpec {
         name: "rough".into(),
-        file: file.to_owned(),
-        place: Place { source: Arc::new(source), span: 7..16 },
+        file: Located::new(file.to_owned(), Place { source: Arc::new(source), span: 7..16 }),
         origin: [0.0; 2],
         spacing: [1.0; 2],
         unit: 1.0,

@@ -10,7 +10,6 @@ use crate::fem::{NodalForces, assemble, surface, unit};
 use crate::linalg::{Csr, dot, length};
 use crate::mesh::{Group, Mesh};
 use crate::model::Segment;
-use crate::problem::SpringKind;
 use std::cell::OnceCell;
 
 /// Smallest cosine of the angle between a force or a constrained direction and the contact normal at which a place is
@@ -88,16 +87,16 @@ fn holders<const D: usize>(body: &SceneBody<D>, mesh: &Mesh<D>) -> Result<Vec<Ho
     let (spec, mut all) = (body.spec, Vec::new());
     for fix in &spec.fix {
         let group = fix.group(mesh)?;
-        let components = (0..D).filter_map(|c| Some((axis_vector(c), fix.value[c].as_ref()?)));
-        let along = fix.normal.as_ref().and_then(|value| Some((normal(body, group)?, value)));
+        let components = (0..D).filter_map(|c| Some((axis_vector(c), fix.components()[c]?)));
+        let along = fix.along_normal().and_then(|value| Some((normal(body, group)?, value)));
         let directions = components.chain(along).map(|(n, value)| (n, !value.is_zero())).collect();
         all.push(holder(body, group, directions));
     }
     for spring in &spec.spring {
         let group = spring.group(mesh)?;
-        let directions: Vec<[f64; D]> = match &spring.kind {
-            SpringKind::Vector(fields) => (0..D).filter(|&c| !fields[c].is_zero()).map(axis_vector).collect(),
-            SpringKind::Normal(_) => normal(body, group).into_iter().collect(),
+        let directions: Vec<[f64; D]> = match &spring.stiffness {
+            Some(fields) => (0..D).filter(|&c| !fields[c].is_zero()).map(axis_vector).collect(),
+            None => normal(body, group).into_iter().collect(),
         };
         all.push(holder(body, group, directions.into_iter().map(|n| (n, false)).collect()));
     }

@@ -65,7 +65,7 @@ macro_rules! line {
 
 line!(RegionSpec, "region", regions, |_region, D| const { &[D] });
 line!(SpringSpec, "spring", spring, |_spring, D| const { &[D - 1, 0] });
-line!(Support, "support", fix, |support, D| match support.normal {
+line!(Support, "support", fix, |support, D| match support.along_normal() {
     Some(_) => const { &[D - 1] },
     None => &[3, 2, 1, 0][3 - D..],
 });

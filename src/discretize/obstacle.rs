@@ -20,7 +20,7 @@ use crate::error::{Error, Result};
 use crate::fem::cross;
 use crate::linalg::{Csr, dot, length};
 use crate::model::{BodySlot, Motion};
-use crate::problem::ContactSpec;
+use crate::problem::{ContactSpec, Vector};
 use crate::scene::Scene;
 
 /// An obstacle before the surface of a pair, with the directions in which it moves.
@@ -40,7 +40,7 @@ impl<'a> Obstacle<'a> {
         let middle = |c: usize| pair.area.iter().zip(&pair.position).map(|(w, x)| w * x[c]).sum::<f64>() / area;
         let is_revolved = pair.measure == Measure::Ring;
         let middle = |c: usize| if is_revolved && c == 0 { 0.0 } else { middle(c) };
-        let at = spec.at.map_or_else(|| [0, 1, 2].map(middle), |at| at.0);
+        let at = spec.at.as_ref().map_or_else(|| [0, 1, 2].map(middle), Vector::numbers);
         Self { pair, spec, normal: mean_normal(pair).unwrap_or_default(), at }
     }
 

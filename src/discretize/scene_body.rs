@@ -6,6 +6,7 @@ use super::supports::{Constraints, moment_load, spring_blocks};
 use super::verify::Verified;
 use crate::contact::Side;
 use crate::error::{Error, Result, shown};
+use crate::expression::Field;
 use crate::fem::elasticity::Flaw;
 use crate::fem::{
     ElasticBody, Elasticity, Facets, NodalForces, NodeGraph, PointExtent, Space, assemble, support, surface,
@@ -79,7 +80,7 @@ impl<'a, const D: usize> SceneBody<'a, D> {
         let name = &self.spec.name;
         let group = spec.group(mesh)?;
         if let (0, LoadKind::Force { total, .. }) = (group.dimension, &spec.kind) {
-            return self.at_nodes(spec, group, total.map(|total| factor * total));
+            return self.at_nodes(spec, group, total.numbers().map(|total| factor * total));
         }
         let facets = self.mesh.space.facets(group);
         if facets.count() == 0 {
@@ -89,8 +90,9 @@ impl<'a, const D: usize> SceneBody<'a, D> {
         if area == 0.0 {
             return Err(without_area(&spec.on, self.spec));
         }
-        if let LoadKind::Moment(moment) = spec.kind {
-            let load = moment_load(&self.mesh.space, &facets, moment.map(|component| factor * component));
+        if let LoadKind::Moment(moment) = &spec.kind {
+            let moment = moment.axial(Field::number).map(|component| factor * component);
+            let load = moment_load(&self.mesh.space, &facets, moment);
             return if load.is_finite() { Ok(load) } else { Err(too_large(self.spec)) };
         }
         let values = FieldValues::of("this load", &name.value);
@@ -104,7 +106,10 @@ impl<'a, const D: usize> SceneBody<'a, D> {
                 std::array::from_fn(|c| factor * values.at(&fields[c], x))
             }
             LoadKind::Force { rigid: true, .. } | LoadKind::Moment(_) | LoadKind::Turning { .. } => [0.0; D],
-            LoadKind::Force { total, .. } => std::array::from_fn(|c| factor * total[c] / area),
+            LoadKind::Force { total, .. } => {
+                let total = total.numbers();
+                std::array::from_fn(|c| factor * total[c] / area)
+            }
         });
         values.refused()?;
         if !load.is_finite() {
@@ -130,9 +135,9 @@ impl<'a, const D: usize> SceneBody<'a, D> {
     /// # Errors
     /// See [`SceneBody::load`].
     pub fn full_load(&self, load: &Load, mesh: &Mesh<D>) -> Result<NodalForces<D>> {
-        match load.kind {
+        match &load.kind {
             LoadKind::Force { total, rigid: true } | LoadKind::Turning { force: total, .. } => {
-                let kind = LoadKind::Force { total, rigid: false };
+                let kind = LoadKind::Force { total: total.clone(), rigid: false };
                 self.on_surface(&Load { kind, ..load.clone() }, 1.0, mesh)
             }
             _ => self.on_surface(load, 1.0, mesh),

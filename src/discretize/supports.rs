@@ -8,7 +8,7 @@ use crate::expression::Field;
 use crate::fem::{Facets, Frame, NodalBlock, NodalForces, Space, cross, length, minus, place, surface};
 use crate::linalg::{dot, pad};
 use crate::mesh::{Group, Mesh};
-use crate::problem::{BodySpec, LoadKind, SpringKind, SpringSpec};
+use crate::problem::{BodySpec, LoadKind, SpringSpec};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -71,10 +71,9 @@ impl<const D: usize> Constraints<D> {
             if nodes.is_empty() {
                 return Err(not_on_body(&fix.on, &spec.name.value));
             }
-            let components = fix.value[..D].iter().enumerate();
-            let mut held_here: Vec<_> =
-                components.filter_map(|(c, field)| Some((axis_vector(c), field.as_ref()?))).collect();
-            if let Some(field) = &fix.normal {
+            let components = fix.components().into_iter().take(D).enumerate();
+            let mut held_here: Vec<_> = components.filter_map(|(c, field)| Some((axis_vector(c), field?))).collect();
+            if let Some(field) = fix.along_normal() {
                 held_here.push((plane(space, group, &fix.on.value, &fix.on.place)?, field));
             }
             held.refuse_on_turning(&nodes, &fix.on, spec)?;
@@ -130,9 +129,9 @@ impl<const D: usize> Constraints<D> {
     fn tie(&mut self, spec: &BodySpec, space: &Space<D>, mesh: &Mesh<D>) -> Result<()> {
         let mut taken: BTreeMap<u32, usize> = BTreeMap::new();
         for (index, load) in spec.load.iter().enumerate() {
-            let (total, moment) = match load.kind {
-                LoadKind::Force { total, rigid: true } => (total, None),
-                LoadKind::Turning { force, moment } => (force, Some(moment)),
+            let (total, moment) = match &load.kind {
+                LoadKind::Force { total, rigid: true } => (total.numbers(), None),
+                LoadKind::Turning { force, moment } => (force.numbers(), Some(moment.axial(Field::number))),
                 _ => continue,
             };
             let group = load.group(mesh)?;
@@ -267,6 +266,7 @@ impl<const D: usize> Constraints<D> {
         for RigidSurface { load, nodes, .. } in &self.rigid {
             let load = &spec.load[*load];
             let LoadKind::Force { total, .. } = &load.kind else { continue };
+            let total = total.numbers();
             let force: [f64; D] = std::array::from_fn(|c| total[c]);
             for Condition { direction, support, .. } in self.conditions.get(&nodes[0]).into_iter().flatten() {
                 let Some(support) = support else { continue };
@@ -379,18 +379,15 @@ pub fn spring_blocks<const D: usize>(
         })
     };
     let at = |x: [f64; D], n: [f64; D]| -> [[f64; D]; D] {
-        match &spring.kind {
-            SpringKind::Vector(fields) => {
-                std::array::from_fn(|i| std::array::from_fn(|j| if i == j { value(&fields[i], x) } else { 0.0 }))
-            }
-            SpringKind::Normal(field) => {
-                let k = value(field, x);
-                n.map(|a| n.map(|b| k * a * b))
-            }
+        if let Some(normal) = &spring.normal {
+            let k = value(normal, x);
+            return n.map(|a| n.map(|b| k * a * b));
         }
+        let along = |c: usize| spring.stiffness.as_ref().map_or(0.0, |stiffness| value(&stiffness[c], x));
+        std::array::from_fn(|i| std::array::from_fn(|j| if i == j { along(i) } else { 0.0 }))
     };
     let blocks = if group.dimension == 0 {
-        if matches!(spring.kind, SpringKind::Normal(_)) {
+        if spring.normal.is_some() {
             return Err(Error::scene(&spring.on.place, format!("points such as `{}` have no normal", spring.on.value))
                 .help("give stiffness = [kx, ky]"));
         }

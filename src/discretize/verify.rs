@@ -9,7 +9,7 @@ use crate::fem::PointExtent;
 use crate::mesh::{Asked, BodyCheck, Duty, EDGES, Groups, LENGTHS, Mesh};
 use crate::problem::body::plain;
 use crate::problem::pattern::{BODY, Pattern, is_pattern};
-use crate::problem::{BodySpec, LoadKind, SpringKind};
+use crate::problem::{BodySpec, LoadKind};
 use crate::problem::{Order, Plane};
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
@@ -271,11 +271,10 @@ fn of_body(body: &BodySpec) -> Vec<(&Located<String>, Need)> {
         LoadKind::Force { rigid: false, .. } => (&load.on, Need::Either),
         _ => (&load.on, Need::Facets),
     });
-    let fix = body.fix.iter().map(|fix| (&fix.on, if fix.normal.is_some() { Need::Facets } else { Need::Nodes }));
-    let spring = body.spring.iter().map(|spring| match spring.kind {
-        SpringKind::Normal(_) => (&spring.on, Need::Facets),
-        SpringKind::Vector(_) => (&spring.on, Need::Points),
-    });
+    let fix =
+        body.fix.iter().map(|fix| (&fix.on, if fix.along_normal().is_some() { Need::Facets } else { Need::Nodes }));
+    let spring_need = |normal: bool| if normal { Need::Facets } else { Need::Points };
+    let spring = body.spring.iter().map(|spring| (&spring.on, spring_need(spring.normal.is_some())));
     let region = body.regions.iter().map(|region| (&region.on, Need::Cells));
     load.chain(fix).chain(spring).chain(region).collect()
 }

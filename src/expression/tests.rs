@@ -286,8 +286,7 @@ fn derivatives_of_data_agree_with_differences() {
     let place = Place { span: 0..source.text.len(), source: Arc::new(source) };
     let spec = DataSpec {
         name: "f".into(),
-        file,
-        place: place.clone(),
+        file: file.into(),
         origin: [0.0; 2],
         spacing: [0.5, 0.8],
         unit: 1.0,

@@ -3,8 +3,10 @@
 
 use super::space::{PAIRS, Slope, component};
 use super::{cross, length};
+use crate::error::Located;
 use crate::linalg::dot;
 use crate::problem::Plane;
+use crate::problem::Vector;
 use crate::problem::elasticity::{AxesSpec, Constants, ElasticitySpec};
 use nalgebra::{Matrix3, Matrix6, Rotation3, Unit, Vector3};
 
@@ -213,24 +215,21 @@ fn tensor(spec: &ElasticitySpec, x: [f64; 3], plane: Plane) -> Result<Tensor, Fl
 
 /// Return the directions 1, 2, 3 of the material at a point, as right-handed orthonormal rows.
 fn directions(axes: &AxesSpec, x: [f64; 3]) -> Result<[[f64; 3]; 3], Flaw> {
-    let (first, second) = match axes {
-        AxesSpec::Directions { first, second } => {
-            let first = unit(first.each_ref().map(|field| field.eval(x)), "`first` has no direction")?;
-            let second = match second {
-                Some(second) => second.each_ref().map(|field| field.eval(x)),
-                None => cross([0.0, 0.0, 1.0], first),
-            };
-            (first, second)
+    let at = |direction: &Option<Located<Vector>>, usual: [f64; 3]| {
+        direction.as_ref().map_or(usual, |vector| vector.each_ref().map(|field| field.eval(x)))
+    };
+    let along_z = [0.0, 0.0, 1.0];
+    let (first, second) = if let Some(angle) = &axes.angle {
+        let axis = unit(at(&axes.axis, along_z), "`axis` has no direction")?;
+        let angle = angle.eval(x);
+        if !angle.is_finite() {
+            return Err(Flaw::Constant("angle", angle, "must be finite"));
         }
-        AxesSpec::Angle { angle, axis } => {
-            let axis = unit(axis.each_ref().map(|field| field.eval(x)), "`axis` has no direction")?;
-            let angle = angle.eval(x);
-            if !angle.is_finite() {
-                return Err(Flaw::Constant("angle", angle, "must be finite"));
-            }
-            let turn = Rotation3::from_axis_angle(&Unit::new_unchecked(axis.into()), angle);
-            ((turn * Vector3::x()).into(), (turn * Vector3::y()).into())
-        }
+        let turn = Rotation3::from_axis_angle(&Unit::new_unchecked(axis.into()), angle);
+        ((turn * Vector3::x()).into(), (turn * Vector3::y()).into())
+    } else {
+        let first = unit(at(&axes.first, [0.0; 3]), "`first` has no direction")?;
+        (first, at(&axes.second, cross(along_z, first)))
     };
     let along = dot(&first, &second);
     let across = std::array::from_fn(|c| second[c] - along * first[c]);

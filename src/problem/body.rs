@@ -1,11 +1,13 @@
 //! Bodies: their names, elements, and what acts on them.
 
+use super::check::{Check, Fault};
+use super::compile::compile;
 use super::elasticity::{AxesSpec, ElasticitySpec, Material, Orthotropic, RegionSpec};
 use super::geometry::Geometry;
-use super::load::{Load, LoadKind, SpringSpec, Support};
+use super::load::{Load, LoadKind, SpringSpec, Support, one};
 use super::order::Order;
 use super::pattern::{self, is_pattern};
-use super::read::{Check, Flaw, Vector, all, kept};
+use super::read::{Vector, located, refused, tables};
 use crate::error::{Error, Located, Place, Result as Checked};
 use crate::expression::{Expression, Field};
 use crate::petsc::{begins_options, is_family};
@@ -27,10 +29,12 @@ pub struct BodySpec {
     /// Poisson's ratio, between -1 and 0.5
     pub poisson: Option<Located<Field>>,
     /// orthotropic = { E1 = ..., E2 = ..., E3 = ..., nu12 = ..., ... }
+    #[serde(default, deserialize_with = "located")]
     pub orthotropic: Option<Located<Orthotropic>>,
     /// C11, C12, ..., C16, C22, ..., C66: the upper triangle by rows, in the order 11 22 33 23 13 12
     pub anisotropic: Option<Located<Vec<Field>>>,
     /// write first = [1, 1, 0] and second = [-1, 1, 0], or angle = "pi/6" and axis = [0, 0, 1]
+    #[serde(default, deserialize_with = "located")]
     pub axes: Option<Located<AxesSpec>>,
     /// whether each connected part of the group is a body, NAME_1, NAME_2, ...
     #[serde(default)]
@@ -41,13 +45,13 @@ pub struct BodySpec {
     /// supports: fix = [{ on = "base", x = 0, y = 0 }]
     ///
     /// They prescribe displacement components on named groups.
-    #[serde(default, deserialize_with = "all")]
+    #[serde(default, deserialize_with = "tables")]
     pub fix: Vec<Support>,
     /// loads: load = [{ on = "top", pressure = 10 }]
-    #[serde(default, deserialize_with = "all")]
+    #[serde(default, deserialize_with = "tables")]
     pub load: Vec<Load>,
     /// springs to the ground: spring = [{ on = "base", stiffness = 100 }]
-    #[serde(default, deserialize_with = "all")]
+    #[serde(default, deserialize_with = "tables")]
     pub spring: Vec<SpringSpec>,
     /// force density, one number or expression for each component
     pub force: Option<Vector>,
@@ -56,17 +60,16 @@ pub struct BodySpec {
     /// a region starts with the line [[body.region]]
     ///
     /// Parts of the body with other elastic constants.
-    #[serde(default, rename = "region", deserialize_with = "all")]
+    #[serde(default, rename = "region", deserialize_with = "tables")]
     pub regions: Vec<RegionSpec>,
     /// Factor of the body force at the present load step; 1 without load steps.
     #[serde(skip, default = "one")]
     pub force_factor: f64,
 }
 
-/// Return the factor of loads without load steps.
-pub(super) fn one() -> f64 {
-    1.0
-}
+compile!(BodySpec {
+    name, young, poisson, orthotropic, anisotropic, axes, fix, load, spring, force, exact, regions
+} else { split, order, force_factor });
 
 impl BodySpec {
     /// Return an isotropic body of linear elements on the group of cells `name`. Young's modulus (a stress, > 0) and
@@ -94,16 +97,17 @@ impl BodySpec {
     #[track_caller]
     pub fn fix<const N: usize>(mut self, on: &str, value: [Option<f64>; N]) -> Self {
         const { assert!(N <= 3, "displacements have three components at most") };
-        let value = std::array::from_fn(|c| value.get(c).copied().flatten().map(Field::Constant));
-        self.fix.push(Support { on: Located::here(on), value, normal: None, path: None, factor: 1.0 });
+        let along = |c: usize| value.get(c).copied().flatten().map(|value| Field::Constant(value).into());
+        let [x, y, z] = [0, 1, 2].map(along);
+        self.fix.push(Support { on: Located::here(on), x, y, z, factor: 1.0, ..Support::default() });
         self
     }
 
     /// Let a plane surface slide in its plane, without displacement along its normal.
     #[track_caller]
     pub fn symmetry(mut self, on: &str) -> Self {
-        let (on, value, normal) = (Located::here(on), [const { None }; 3], Some(Field::Constant(0.0)));
-        self.fix.push(Support { on, value, normal, path: None, factor: 1.0 });
+        let (on, symmetry) = (Located::here(on), Some(true.into()));
+        self.fix.push(Support { on, symmetry, factor: 1.0, ..Support::default() });
         self
     }
 
@@ -118,9 +122,7 @@ impl BodySpec {
     /// coordinates.
     #[track_caller]
     pub fn traction<const N: usize>(self, on: &str, traction: [impl Into<Field>; N]) -> Self {
-        const { assert!(N <= 3, "tractions have three components at most") };
-        let mut given = traction.into_iter().map(Into::into);
-        self.load(on, LoadKind::Traction(std::array::from_fn(|_| given.next().unwrap_or(Field::Constant(0.0)))))
+        self.load(on, LoadKind::Traction(traction.map(Into::into).into()))
     }
 
     /// Add a pressure against the outer normal (a stress, > 0 pushes), a number or a function of the coordinates.
@@ -142,20 +144,23 @@ impl BodySpec {
 
 impl Check for BodySpec {
     /// Check the keys of the body itself. Regions, supports, springs and loads are checked by themselves.
-    fn check(&self, geometry: Geometry) -> Result<(), Flaw> {
+    fn check(&self, geometry: Geometry) -> Result<(), Fault> {
         check_name(&self.name)?;
-        self.material().check("[[body]]")?;
+        self.material().check("[[body]]", geometry)?;
         if self.order > Order::P2 && !geometry.is_plane() {
             let help = "bodies in space are of order 1 or 2, in the plane from 1 to 8";
-            return Err(Flaw::new("order", format!("order {} in space", self.order.degree()), "", help));
+            return Err(Fault::new("order", format!("order {} in space", self.order.degree()), "", help));
         }
-        if geometry.is_plane() && self.force.as_ref().is_some_and(|force| !force[2].is_zero()) {
-            return Err(Flaw::new("force", "a body force in z in a plane problem", "", ""));
+        if let Some(force) = &self.force {
+            force.check("force", geometry)?;
+            if geometry.is_plane() && !force[2].is_zero() {
+                return Err(Fault::new("force", "a body force in z in a plane problem", "", ""));
+            }
         }
         let count = self.exact.as_ref().map_or(geometry.dimension, Vec::len);
         if count != geometry.dimension {
             let message = format!("a vector has {} components here, not {count}", geometry.dimension);
-            return Err(Flaw::new("exact", message, "", "give one function for each component of the displacement"));
+            return Err(Fault::new("exact", message, "", "give one function for each component of the displacement"));
         }
         Ok(())
     }
@@ -194,7 +199,7 @@ pub fn plain_pattern(text: &str) -> String {
 /// An empty text, and a pattern that is none.
 pub(super) fn body_name<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Located<String>, D::Error> {
     let name = Located::<String>::deserialize(deserializer)?;
-    pattern::check(&name).map_err(kept)?;
+    pattern::check(&name).map_err(refused)?;
     Ok(Located { value: plain_pattern(&name.value), ..name })
 }
 

@@ -1,11 +1,13 @@
 //! Pairs of contact surfaces: two that the scene names, or rules that find pairs.
 
-use super::body::{check_name, one, plain_pattern};
+use super::body::{check_name, plain_pattern};
+use super::check::{Check, Fault, positive};
+use super::compile::{Compile, Names, compile};
 use super::geometry::{Geometry, Plane};
 use super::layer::LayerSpec;
-use super::load::{axial_of, echo_of};
+use super::load::one;
 use super::pattern;
-use super::read::{Check, Either, Flaw, Form, OneOrVector, Vector, by_factors, checked, kept, of_steps, positive};
+use super::read::{Either, Form, OneOrVector, Vector, check_numbers, refused, some_table, table};
 use crate::error::{Error, Located, Result as Checked, shown};
 use crate::expression::Field;
 use schemars::JsonSchema;
@@ -35,7 +37,7 @@ pub struct ContactSpec {
     /// give power = { B = 2.5e-5, a = 0.5 } or linear = { stiffness = 1e5 }
     ///
     /// Law of the layer.
-    #[serde(deserialize_with = "checked")]
+    #[serde(deserialize_with = "table")]
     pub layer: LayerSpec,
     /// how far apart facets of a pair may be; required with "auto"
     ///
@@ -44,7 +46,7 @@ pub struct ContactSpec {
     /// gap besides the distance of the meshes; it may use factors of load steps
     ///
     /// Gap (a length) that is added to the distance of the meshes.
-    #[serde(default = "no_gap", deserialize_with = "of_steps")]
+    #[serde(default = "no_gap")]
     pub gap: Field,
     /// largest angle in degrees between normals that face each other
     ///
@@ -73,25 +75,22 @@ pub struct ContactSpec {
     #[serde(default)]
     pub bond: bool,
     /// law of a bonded layer where it is stretched: tension over stretch
-    #[serde(default, deserialize_with = "checked")]
+    #[serde(default, deserialize_with = "some_table")]
     pub tension: Option<LayerSpec>,
     /// whether the surface `on` is before a rigid obstacle, which is given by the gap
     #[serde(default)]
     pub obstacle: bool,
     /// how far an obstacle moves towards the surface, along its mean normal; 0 without `force`
-    #[serde(default, deserialize_with = "by_factors")]
     pub approach: Option<Field>,
     /// how far an obstacle turns, in radians: about z in the plane, in space a vector; 0 without `moment`
-    #[serde(default, deserialize_with = "by_factors")]
-    pub tilt: Option<Axial>,
+    pub tilt: Option<OneOrVector>,
     /// total of the normal forces, for which the gap changes by an offset; force on an obstacle along the mean normal
-    #[serde(default, deserialize_with = "by_factors")]
     pub force: Option<Field>,
     /// moment on an obstacle about `at`, under which it turns: a number in the plane, in space a vector
-    #[serde(default, deserialize_with = "by_factors")]
-    pub moment: Option<Axial>,
+    pub moment: Option<OneOrVector>,
     /// point about which an obstacle turns; the middle of its surface without this key
-    pub at: Option<Point>,
+    #[schemars(with = "Option<Vec<f64>>")]
+    pub at: Option<Vector>,
     /// force for which the first load step finds the offset of the gap, which later steps keep; a tension where the
     /// pair is bonded
     ///
@@ -194,7 +193,7 @@ impl ContactSpec {
 
     /// Iterate over the forces and motions that are given.
     fn given(&self) -> impl Iterator<Item = &Field> {
-        let turns = [&self.tilt, &self.moment].into_iter().flatten().flat_map(|axial| &axial.0);
+        let turns = [&self.tilt, &self.moment].into_iter().flatten().flat_map(OneOrVector::fields);
         [&self.approach, &self.force].into_iter().flatten().chain(turns)
     }
 
@@ -205,7 +204,7 @@ impl ContactSpec {
 
     /// Give its expressions the factors of a load step.
     pub fn set_factors(&mut self, factors: &[f64]) {
-        let turns = [&mut self.tilt, &mut self.moment].into_iter().flatten().flat_map(|axial| &mut axial.0);
+        let turns = [&mut self.tilt, &mut self.moment].into_iter().flatten().flat_map(OneOrVector::fields_mut);
         let numbers = [&mut self.approach, &mut self.force].into_iter().flatten();
         numbers.chain(turns).chain([&mut self.gap]).for_each(|field| *field = field.in_step(factors));
     }
@@ -230,24 +229,17 @@ impl ContactSpec {
 
     /// Return the turn that is given in the present load step.
     pub fn tilt(&self) -> Option<[f64; 3]> {
-        self.tilt.as_ref().map(|axial| axial.0.each_ref().map(|field| self.in_step(field)))
+        self.tilt.as_ref().map(|axial| axial.axial(|field| self.in_step(field)))
     }
 
     /// Return the moment that is given in the present load step.
     pub fn moment(&self) -> Option<[f64; 3]> {
-        self.moment.as_ref().map(|axial| axial.0.each_ref().map(|field| self.in_step(field)))
+        self.moment.as_ref().map(|axial| axial.axial(|field| self.in_step(field)))
     }
 
     /// Return a force or motion in the present load step. An expression has the factors that it names, and no other.
     fn in_step(&self, field: &Field) -> f64 {
         if field.is_constant() { self.factor * number(field) } else { number(field) }
-    }
-
-    /// Complete the two surfaces of a contact that was read: an obstacle is the second one.
-    pub fn complete(&mut self) {
-        if let Some(on) = &self.on {
-            self.between = [on.clone(), Located::new(OBSTACLE.to_owned(), on.place.clone())];
-        }
     }
 
     /// Return whether it is a rule that finds pairs, and names no surfaces: `between = "auto"`.
@@ -279,12 +271,32 @@ pub enum Overlap {
     Refuse,
 }
 
+compile!(ContactSpec { between, on, of, layer, tension, at, path, reference } else {
+    gap, approach, force, tilt, moment, distance, angle, edge, touching, bond, obstacle, preload, overlap, table, factor
+} then compile_steps);
+
+impl ContactSpec {
+    /// Compile what changes in load steps: forces and motions have their factors as variables, the gap these and the
+    /// coordinates. An obstacle becomes the second surface.
+    fn compile_steps(&mut self, names: &Names<'_>) -> Checked<()> {
+        let Self { gap, approach, force, tilt, moment, .. } = self;
+        let in_steps = names.in_steps();
+        gap.compile(&in_steps)?;
+        [approach, force].into_iter().try_for_each(|field| field.compile(&in_steps.with(&[])))?;
+        [tilt, moment].into_iter().try_for_each(|axial| axial.compile(&in_steps.with(&[])))?;
+        if let (Some(on), true) = (&self.on, self.between.iter().all(|name| name.is_empty())) {
+            self.between = [on.clone(), Located::new(OBSTACLE.to_owned(), on.place.clone())];
+        }
+        Ok(())
+    }
+}
+
 impl Check for ContactSpec {
     /// Check all but the layer, which is checked by itself.
-    fn check(&self, geometry: Geometry) -> Result<(), Flaw> {
+    fn check(&self, geometry: Geometry) -> Result<(), Fault> {
         match (&self.on, self.obstacle) {
             (None, false) if self.between.iter().all(|name| name.is_empty()) => {
-                return Err(Flaw::new("", "[[contact]] has no `between`", "`between` is missing", EXAMPLE));
+                return Err(Fault::new("", "[[contact]] has no `between`", "`between` is missing", EXAMPLE));
             }
             (None, false) if self.is_rule() => self.check_rule()?,
             (None, false) => self.check_pair()?,
@@ -294,16 +306,16 @@ impl Check for ContactSpec {
         positive("angle", "the angle", self.angle)?;
         if self.angle > 90.0 {
             let message = format!("the angle is {} degrees", shown(self.angle));
-            return Err(Flaw::new("angle", message, "must be at most 90", ""));
+            return Err(Fault::new("angle", message, "must be at most 90", ""));
         }
         positive("edge", "the angle of edges", self.edge)?;
         if self.edge > 180.0 {
             let message = format!("the angle of edges is {} degrees", shown(self.edge));
-            return Err(Flaw::new("edge", message, "must be at most 180", "at 180 no surface is split"));
+            return Err(Fault::new("edge", message, "must be at most 180", "at 180 no surface is split"));
         }
         if self.tension.is_some() && !self.bond {
             let help = "write bond = true, or leave `tension` away";
-            return Err(Flaw::new("tension", "only a bonded layer has a law in tension", "", help));
+            return Err(Fault::new("tension", "only a bonded layer has a law in tension", "", help));
         }
         self.distance.map_or(Ok(()), |distance| positive("distance", "the distance", distance))
     }
@@ -311,39 +323,39 @@ impl Check for ContactSpec {
 
 impl ContactSpec {
     /// Check a rule that finds pairs.
-    fn check_rule(&self) -> Result<(), Flaw> {
+    fn check_rule(&self) -> Result<(), Fault> {
         if self.distance.is_none() {
             let help = "facets of different bodies that face each other at most that far apart form pairs";
-            return Err(Flaw::new("", "[[contact]] has no `distance`", "`distance` is missing", help));
+            return Err(Fault::new("", "[[contact]] has no `distance`", "`distance` is missing", help));
         }
         let totals = [("force", self.force.is_some()), ("preload", self.preload.is_some())];
         if let Some((key, _)) = totals.iter().find(|(_, is_given)| *is_given) {
             let help = "name the two surfaces: between = [\"one\", \"other\"]";
-            return Err(Flaw::new(*key, format!("`{key}` for pairs that are found"), "", help));
+            return Err(Fault::new(*key, format!("`{key}` for pairs that are found"), "", help));
         }
         self.of.iter().flatten().try_for_each(check_name)?;
         Ok(())
     }
 
     /// Check a surface before an obstacle.
-    fn check_obstacle(&self, on: Option<&Located<String>>) -> Result<(), Flaw> {
+    fn check_obstacle(&self, on: Option<&Located<String>>) -> Result<(), Fault> {
         let is_pair = !self.between[1].is_empty() && self.between[1].value != OBSTACLE;
         match on {
             Some(_) if is_pair => {
                 let help = "remove `between` or `on`";
-                Err(Flaw::new("on", "[[contact]] has both `between` and `on`", "only one of them can hold", help))
+                Err(Fault::new("on", "[[contact]] has both `between` and `on`", "only one of them can hold", help))
             }
             Some(_) if !self.obstacle => {
                 let help = "one surface before a rigid obstacle has obstacle = true, two surfaces have between = [\"one\", \"other\"]";
-                Err(Flaw::new("on", "`on` without an obstacle", "", help))
+                Err(Fault::new("on", "`on` without an obstacle", "", help))
             }
             None => {
                 let help = "an obstacle is before one surface: on = \"top\"";
-                Err(Flaw::new("obstacle", "[[contact]] has no `on`", "`on` is missing", help))
+                Err(Fault::new("obstacle", "[[contact]] has no `on`", "`on` is missing", help))
             }
             Some(_) if self.preload.is_some() => {
                 let help = "it has a force in each load step: force = F";
-                Err(Flaw::new("preload", "a preload of an obstacle", "", help))
+                Err(Fault::new("preload", "a preload of an obstacle", "", help))
             }
             Some(on) => {
                 let of_meshes = [
@@ -355,7 +367,7 @@ impl ContactSpec {
                 if let Some((key, _)) = of_meshes.iter().find(|(_, is_given)| *is_given) {
                     let help =
                         "it is for the meshes of two bodies: the `gap` alone says where an obstacle is; remove it";
-                    return Err(Flaw::new(*key, format!("`{key}` of an obstacle"), "", help));
+                    return Err(Fault::new(*key, format!("`{key}` of an obstacle"), "", help));
                 }
                 Ok(pattern::check(on)?)
             }
@@ -363,8 +375,14 @@ impl ContactSpec {
     }
 
     /// Check the forces and motions of obstacles and offsets.
-    fn check_forces(&self, geometry: Geometry) -> Result<(), Flaw> {
-        let turn = |axial: &Option<Axial>| axial.as_ref().map(|axial| axial.0.to_vec());
+    fn check_forces(&self, geometry: Geometry) -> Result<(), Fault> {
+        self.tilt.as_ref().map_or(Ok(()), |tilt| tilt.check_axial("tilt", geometry))?;
+        self.moment.as_ref().map_or(Ok(()), |moment| moment.check_axial("moment", geometry))?;
+        if let Some(at) = &self.at {
+            at.check("at", geometry)?;
+            check_numbers(&at[..])?;
+        }
+        let turn = |axial: &Option<OneOrVector>| axial.as_ref().map(|axial| axial.fields().to_vec());
         let number = |field: &Option<Field>| field.clone().map(|field| vec![field]);
         let mut given = vec![
             ("approach", number(&self.approach)),
@@ -372,31 +390,31 @@ impl ContactSpec {
             ("preload", self.preload.map(|preload| vec![Field::Constant(preload)])),
             ("tilt", turn(&self.tilt)),
             ("moment", turn(&self.moment)),
-            ("at", self.at.map(|at| at.0.map(Field::Constant).to_vec())),
+            ("at", self.at.as_ref().map(|at| at.to_vec())),
         ];
         given.retain(|(_, values)| values.is_some());
         let of = |keys: &[&str]| given.iter().map(|(key, _)| *key).filter(|key| keys.contains(key)).collect::<Vec<_>>();
         if let (false, [key, ..]) = (self.obstacle, &of(&["approach", "tilt", "moment", "at"])[..]) {
             let help = "on = \"top\", obstacle = true";
-            return Err(Flaw::new(*key, format!("`{key}` of a contact without an obstacle"), "", help));
+            return Err(Fault::new(*key, format!("`{key}` of a contact without an obstacle"), "", help));
         }
         for keys in [of(&["approach", "force", "preload"]), of(&["tilt", "moment"])] {
             if let [first, second, ..] = keys[..] {
                 let message = format!("[[contact]] has both `{first}` and `{second}`");
                 let help = format!("remove `{first}` or `{second}`");
-                return Err(Flaw::new(second, message, "only one of them can hold", &help));
+                return Err(Fault::new(second, message, "only one of them can hold", &help));
             }
         }
         if let (Plane::Axisymmetric, [key, ..]) = (geometry.plane, &of(&["tilt", "moment"])[..]) {
             let message = "an obstacle that turns in an axisymmetric scene";
-            return Err(Flaw::new(*key, message, "it moves along the axis alone", ""));
+            return Err(Fault::new(*key, message, "it moves along the axis alone", ""));
         }
         for (key, fields) in &given {
             // expressions are known in each load step
             let is_constant = |field: &&Field| field.is_constant();
             let values: Vec<f64> = fields.iter().flatten().filter(is_constant).map(self::number).collect();
             if let Some(value) = values.iter().find(|value| !value.is_finite()) {
-                return Err(Flaw::new(*key, format!("`{key}` is {value}"), "", ""));
+                return Err(Fault::new(*key, format!("`{key}` is {value}"), "", ""));
             }
             let is_pull = *key == "preload" || *key == "force" && !self.bond;
             if let Some(value) = values.first().filter(|value| is_pull && **value < 0.0) {
@@ -407,22 +425,22 @@ impl ContactSpec {
                     "preload" => "a preload > 0 presses".to_owned(),
                     _ => "a force > 0 presses; only a bonded pair can be pulled".to_owned(),
                 };
-                return Err(Flaw::new(*key, format!("a negative `{key}`"), "", help));
+                return Err(Fault::new(*key, format!("a negative `{key}`"), "", help));
             }
         }
         let is_scaled = |field: &Field| field.is_constant() && !field.is_zero();
         if self.path.is_some() && of(&["approach", "force", "preload", "tilt", "moment"]).is_empty() {
-            return Err(Flaw::new("path", "`path` without a force or motion of this contact", "", ""));
+            return Err(Fault::new("path", "`path` without a force or motion of this contact", "", ""));
         }
         if self.path.is_some() && self.given().any(|field| !field.is_constant()) && !self.given().any(is_scaled) {
             let help = "remove it: an expression has the columns of the table as variables, force = \"100*press\"";
-            return Err(Flaw::new("path", "`path` of an expression", "", help));
+            return Err(Fault::new("path", "`path` of an expression", "", help));
         }
         Ok(())
     }
 
     /// Check a pair of surfaces: two plain names.
-    fn check_pair(&self) -> Result<(), Flaw> {
+    fn check_pair(&self) -> Result<(), Fault> {
         let [a, b] = &self.between;
         if a == b {
             let error = Error::scene(&b.place, format!("a contact between `{}` and itself", b.value));
@@ -434,7 +452,7 @@ impl ContactSpec {
         }
         if self.of.is_some() {
             let help = "it says which bodies form pairs with between = \"auto\"";
-            return Err(Flaw::new("of", "`of` for surfaces with names", "", help));
+            return Err(Fault::new("of", "`of` for surfaces with names", "", help));
         }
         if let Some(name) = self.between.iter().find(|name| name.contains(['*', '?'])) {
             let help =
@@ -458,44 +476,9 @@ fn is_with_obstacle(between: &[Located<String>; 2]) -> bool {
     between[1].value == OBSTACLE
 }
 
-/// A rotation or a moment: about z in the plane, a vector in space.
-#[derive(Debug, Clone, JsonSchema)]
-#[schemars(with = "OneOrVector")]
-pub struct Axial(pub [Field; 3]);
-
 /// Return the number that a field without coordinates has in a load step.
 fn number(field: &Field) -> f64 {
     field.eval([0.0; 3])
-}
-
-impl<'de> Deserialize<'de> for Axial {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        axial_of(Located::deserialize(deserializer)?).map(Self).map_err(kept)
-    }
-}
-
-impl Serialize for Axial {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        echo_of(self.0.clone()).serialize(serializer)
-    }
-}
-
-/// A point of the scene.
-#[derive(Debug, Clone, Copy, PartialEq, JsonSchema)]
-#[schemars(with = "Vec<f64>")]
-pub struct Point(pub [f64; 3]);
-
-impl<'de> Deserialize<'de> for Point {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let point = Located::<Vector>::deserialize(deserializer)?;
-        point.numbers().map(Self).map_err(|error| kept(error.or_at(&point.place)))
-    }
-}
-
-impl Serialize for Point {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        Vector::from(self.0).serialize(serializer)
-    }
 }
 
 /// The value of `between` in rules that find pairs, and the name of both surfaces there.
@@ -508,13 +491,15 @@ fn between<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[Located<String
     let Located { value, place } = Located::<Form<Located<String>>>::deserialize(deserializer)?;
     match value {
         Form::Text(word) if word == AUTO => Ok([(); 2].map(|()| Located::new(word.clone(), place.clone()))),
-        Form::Text(word) => Err(kept(Error::scene(&place, format!("a contact between `{word}` alone")).help(EXAMPLE))),
+        Form::Text(word) => {
+            Err(refused(Error::scene(&place, format!("a contact between `{word}` alone")).help(EXAMPLE)))
+        }
         Form::List(names) => {
-            names.iter().try_for_each(pattern::check).map_err(kept)?;
-            let count = |_| kept(Error::scene(&place, "a contact is between two surfaces").help(EXAMPLE));
+            names.iter().try_for_each(pattern::check).map_err(refused)?;
+            let count = |_| refused(Error::scene(&place, "a contact is between two surfaces").help(EXAMPLE));
             names.try_into().map_err(count)
         }
-        other => Err(other.unexpected()),
+        other => Err(other.instead_of("\"auto\" or a list of two names", &place)),
     }
 }
 
@@ -529,8 +514,8 @@ fn write_between<S: Serializer>(between: &[Located<String>; 2], serializer: S) -
 fn of<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<[Located<String>; 2]>, D::Error> {
     let Located { value: names, place } = Located::<Vec<Located<String>>>::deserialize(deserializer)?;
     let names: [Located<String>; 2] = names.try_into().map_err(|_| {
-        kept(Error::scene(&place, "pairs are of two bodies").help("write of = [\"one_*\", \"other_*\"]"))
+        refused(Error::scene(&place, "pairs are of two bodies").help("write of = [\"one_*\", \"other_*\"]"))
     })?;
-    names.iter().try_for_each(pattern::check).map_err(kept)?;
+    names.iter().try_for_each(pattern::check).map_err(refused)?;
     Ok(Some(names.map(|name| Located { value: plain_pattern(&name.value), ..name })))
 }

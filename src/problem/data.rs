@@ -1,12 +1,14 @@
 //! The settings of `[data.NAME]`: functions for expressions from files.
 
-use super::read::{Either, Form, file, place_of};
+use super::compile::{Compile, Names};
+use super::read::{Either, Form, Table, refused, unplaced};
 use crate::data::{Data, DataSpec, Detrend, Interpolation, Library, Outside};
 use crate::error::{Error, Located, Place, Result as Checked};
 use crate::expression::names;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serializer};
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::sync::Arc;
 use toml::Spanned;
 
@@ -19,7 +21,7 @@ use toml::Spanned;
 #[serde(deny_unknown_fields)]
 pub struct DataKeys {
     /// heights in rows: .npy, or a table of numbers
-    file: Located<String>,
+    file: Located<PathBuf>,
     /// place of the first height; 0
     #[serde(default)]
     origin: Pair,
@@ -38,18 +40,26 @@ pub struct DataKeys {
     outside: Outside,
 }
 
-/// Return the data of a scene by name. Their files must exist; they are not read.
+/// Read the data of a scene by name, for `#[serde(deserialize_with)]`.
 ///
 /// # Errors
-/// Names that expressions cannot use, files that are not there, and impossible numbers.
-pub fn library(given: BTreeMap<Spanned<String>, DataKeys>) -> Checked<Library> {
+/// Those of serde, names that expressions cannot use, and impossible numbers.
+pub fn library<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Library, D::Error> {
     let mut library = Library::new();
-    for (name, keys) in given {
-        check_name(name.get_ref(), &place_of(name.span()))?;
-        let spec = keys.spec(name.get_ref())?;
+    for (name, Table(keys)) in BTreeMap::<Spanned<String>, Table<DataKeys>>::deserialize(deserializer)? {
+        check_name(name.get_ref(), &unplaced(name.span())).map_err(refused)?;
+        let spec = keys.value.spec(name.get_ref()).map_err(refused)?;
         library.insert(name.into_inner(), Arc::new(Data::new(spec)));
     }
     Ok(library)
+}
+
+/// Find the files of data that were just read from a scene. They are read when an expression needs them.
+///
+/// # Errors
+/// Files that are not there.
+pub fn find_files(library: &mut Library, names: &Names<'_>) -> Checked<()> {
+    library.values_mut().filter_map(Arc::get_mut).try_for_each(|data| data.spec.file.compile(names))
 }
 
 /// Refuse names that expressions cannot use, or use for something else.
@@ -77,11 +87,9 @@ impl DataKeys {
                 Error::scene(&unit.place, format!("the unit is {}", unit.value)).label("must be finite and not 0")
             );
         }
-        let file = file(self.file)?;
         Ok(DataSpec {
             name: name.to_owned(),
-            file: file.value,
-            place: file.place,
+            file: self.file,
             origin: self.origin.0,
             spacing,
             unit: self.unit.map_or(1.0, |unit| unit.value),
@@ -107,14 +115,15 @@ struct Pair([f64; 2]);
 
 impl<'de> Deserialize<'de> for Pair {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        match Form::<f64>::deserialize(deserializer)? {
+        let Located { value, place } = Located::<Form<f64>>::deserialize(deserializer)?;
+        match value {
             Form::Integer(both) => Ok(Self([both as f64; 2])),
             Form::Number(both) => Ok(Self([both; 2])),
             Form::List(numbers) => match numbers[..] {
                 [a, b] => Ok(Self([a, b])),
                 _ => Err(serde::de::Error::custom("must be one number, or two in a list")),
             },
-            other => Err(other.unexpected()),
+            other => Err(other.instead_of("a number or two in a list", &place)),
         }
     }
 }

@@ -1,9 +1,11 @@
 //! Elastic constants of bodies and regions, and the axes that they refer to.
 
+use super::check::{Check, Fault, positive};
+use super::compile::compile;
 use super::geometry::Geometry;
 use super::pattern;
-use super::read::{Check, Direction, Flaw, Refused, geometry, only_one, place, positive};
-use crate::error::{Error, Kind, Located, Place, shown};
+use super::read::{Vector, located, only_one, place};
+use crate::error::{Located, Place, shown};
 use crate::expression::Field;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -42,26 +44,23 @@ pub enum Constants {
     Anisotropic(Box<[Field; 21]>),
 }
 
-/// The directions of the material's axes.
-#[derive(Debug, Clone, PartialEq, Deserialize, Serialize, JsonSchema)]
-#[serde(try_from = "AxesKeys", untagged)]
-pub enum AxesSpec {
-    /// A direction along axis 1, and one towards axis 2.
-    Directions {
-        /// Direction of axis 1.
-        first: [Field; 3],
-        /// A vector in the plane of axes 1 and 2, on the side of axis 2. Without it, in plane problems, axis 2 is at a
-        /// right angle to the left of axis 1.
-        second: Option<[Field; 3]>,
-    },
-    /// The axes x, y, z, turned about an axis.
-    Angle {
-        /// The angle, in radians.
-        angle: Field,
-        /// The axis; z in plane problems.
-        axis: [Field; 3],
-    },
+/// The axes of a material: a direction along axis 1 and one towards axis 2, or x, y, z turned about an axis.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AxesSpec {
+    /// direction of axis 1
+    pub first: Option<Located<Vector>>,
+    /// direction on the side of axis 2
+    ///
+    /// Without it, in plane problems, axis 2 is at a right angle to the left of axis 1.
+    pub second: Option<Located<Vector>>,
+    /// angle (radian) by which x, y, z are turned
+    pub angle: Option<Located<Field>>,
+    /// axis of the turn; z in the plane
+    pub axis: Option<Located<Vector>>,
 }
+
+compile!(AxesSpec { first, second, angle, axis } else {});
 
 /// A part of a body with constants of its own.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
@@ -74,12 +73,16 @@ pub struct RegionSpec {
     /// Poisson's ratio, between -1 and 0.5
     pub poisson: Option<Located<Field>>,
     /// orthotropic = { E1 = ..., E2 = ..., E3 = ..., nu12 = ..., ... }
+    #[serde(default, deserialize_with = "located")]
     pub orthotropic: Option<Located<Orthotropic>>,
     /// C11, C12, ..., C16, C22, ..., C66: the upper triangle by rows, in the order 11 22 33 23 13 12
     pub anisotropic: Option<Located<Vec<Field>>>,
     /// write first = [1, 1, 0] and second = [-1, 1, 0], or angle = "pi/6" and axis = [0, 0, 1]
+    #[serde(default, deserialize_with = "located")]
     pub axes: Option<Located<AxesSpec>>,
 }
+
+compile!(RegionSpec { on, young, poisson, orthotropic, anisotropic, axes } else {});
 
 impl RegionSpec {
     /// Return the elastic constants and their axes.
@@ -94,9 +97,9 @@ impl RegionSpec {
 }
 
 impl Check for RegionSpec {
-    fn check(&self, _: Geometry) -> Result<(), Flaw> {
+    fn check(&self, geometry: Geometry) -> Result<(), Fault> {
         pattern::check(&self.on)?;
-        self.material().check("[[body.region]]")
+        self.material().check("[[body.region]]", geometry)
     }
 }
 
@@ -130,6 +133,33 @@ pub struct Orthotropic {
     pub g23: Field,
 }
 
+compile!(Orthotropic { e1, e2, e3, nu12, nu13, nu23, g12, g13, g23 } else {});
+
+impl AxesSpec {
+    fn check(&self, geometry: Geometry) -> Result<(), Fault> {
+        let Self { first, second, angle, axis } = self;
+        for [a, b] in [
+            [("first", place(first)), ("angle", place(angle))],
+            [("second", place(second)), ("angle", place(angle))],
+            [("first", place(first)), ("axis", place(axis))],
+        ] {
+            only_one("the axes", &[a, b])?;
+        }
+        for (key, direction) in [("first", first), ("second", second), ("axis", axis)] {
+            // in the plane the third component may be left out
+            let short = direction.as_ref().filter(|vector| !vector.is_in_space());
+            short.map_or(Ok(()), |vector| vector.check(&format!("axes.{key}"), geometry))?;
+        }
+        let missing = match (angle, first) {
+            (Some(_), _) if axis.is_none() && !geometry.is_plane() => "axis",
+            (None, None) => "first",
+            (None, Some(_)) if second.is_none() && !geometry.is_plane() => "second",
+            _ => return Ok(()),
+        };
+        Err(Fault::new("axes", format!("the axes have no `{missing}`"), &format!("`{missing}` is missing"), AXES))
+    }
+}
+
 impl Constants {
     /// The names of the orthotropic constants.
     pub const ORTHOTROPIC: [&'static str; 9] = ["E1", "E2", "E3", "nu12", "nu13", "nu23", "G12", "G13", "G23"];
@@ -143,16 +173,11 @@ impl ElasticitySpec {
             Constants::Orthotropic(fields) => Constants::ORTHOTROPIC.into_iter().zip(fields.iter()).collect(),
             Constants::Anisotropic(fields) => fields.iter().map(|field| ("an elastic constant", field)).collect(),
         };
-        match &self.axes {
-            Some(AxesSpec::Directions { first, second }) => {
-                fields.extend(first.iter().map(|field| ("`first`", field)));
-                fields.extend(second.iter().flatten().map(|field| ("`second`", field)));
+        if let Some(AxesSpec { first, second, angle, axis }) = &self.axes {
+            for (name, direction) in [("`first`", first), ("`second`", second), ("`axis`", axis)] {
+                fields.extend(direction.iter().flat_map(|vector| vector.iter()).map(|field| (name, field)));
             }
-            Some(AxesSpec::Angle { angle, axis }) => {
-                fields.push(("angle", angle));
-                fields.extend(axis.iter().map(|field| ("`axis`", field)));
-            }
-            None => {}
+            fields.extend(angle.iter().map(|angle| ("angle", &angle.value)));
         }
         fields
     }
@@ -191,7 +216,7 @@ impl<'a> Material<'a> {
     }
 
     /// Check the keys; `table` is the name of their table in messages.
-    pub fn check(&self, table: &str) -> Result<(), Flaw> {
+    pub fn check(&self, table: &str, geometry: Geometry) -> Result<(), Fault> {
         let Self { young, poisson, orthotropic, anisotropic, axes } = *self;
         let [tensor, matrix] =
             [("orthotropic", orthotropic.map(|all| &all.place)), ("anisotropic", anisotropic.map(|all| &all.place))];
@@ -200,21 +225,21 @@ impl<'a> Material<'a> {
         }
         if let Some(constants) = anisotropic.filter(|constants| constants.len() != 21) {
             let message = format!("an anisotropic material has 21 constants, not {}", constants.len());
-            return Err(Flaw::new("anisotropic", message, "", UPPER));
+            return Err(Fault::new("anisotropic", message, "", UPPER));
         }
         if tensor.1.or(matrix.1).is_some() {
-            return Ok(());
+            return axes.map_or(Ok(()), |axes| axes.check(geometry));
         }
         let others = "a material is young and poisson, orthotropic = { E1 = ... } or anisotropic = [C11, ...]";
         for (key, value) in [("young", young), ("poisson", poisson)] {
             if value.is_none() {
-                return Err(Flaw::new("", format!("{table} has no `{key}`"), &format!("`{key}` is missing"), others));
+                return Err(Fault::new("", format!("{table} has no `{key}`"), &format!("`{key}` is missing"), others));
             }
         }
         check_isotropic(young.map(|young| &young.value), poisson.map(|poisson| &poisson.value))?;
         match axes {
             None => Ok(()),
-            Some(_) => Err(Flaw::new(
+            Some(_) => Err(Fault::new(
                 "axes",
                 "axes of an isotropic material",
                 "all directions are alike",
@@ -245,7 +270,7 @@ impl<'a> Material<'a> {
     }
 }
 
-fn check_isotropic(young: Option<&Field>, poisson: Option<&Field>) -> Result<(), Flaw> {
+fn check_isotropic(young: Option<&Field>, poisson: Option<&Field>) -> Result<(), Fault> {
     if let Some(Field::Constant(young)) = young {
         positive("young", "Young's modulus", *young)?;
     }
@@ -254,52 +279,8 @@ fn check_isotropic(young: Option<&Field>, poisson: Option<&Field>) -> Result<(),
             let help = "incompressible bodies are not possible; take 0.4999 and order = 2, say";
             let message = format!("Poisson's ratio is {}", shown(value));
             let help = if value == 0.5 { help } else { "" };
-            Err(Flaw::new("poisson", message, "must lie between -1 and 0.5", help))
+            Err(Fault::new("poisson", message, "must lie between -1 and 0.5", help))
         }
         _ => Ok(()),
-    }
-}
-
-/// The axes of a material.
-#[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-struct AxesKeys {
-    /// direction of axis 1
-    first: Option<Located<Direction>>,
-    /// direction on the side of axis 2
-    second: Option<Located<Direction>>,
-    /// angle (radian) by which x, y, z are turned
-    angle: Option<Located<Field>>,
-    /// axis of the turn; z in the plane
-    axis: Option<Located<Direction>>,
-}
-
-impl TryFrom<AxesKeys> for AxesSpec {
-    type Error = Refused;
-
-    fn try_from(AxesKeys { first, second, angle, axis }: AxesKeys) -> Result<Self, Refused> {
-        for [a, b] in [
-            [("first", place(&first)), ("angle", place(&angle))],
-            [("second", place(&second)), ("angle", place(&angle))],
-            [("first", place(&first)), ("axis", place(&axis))],
-        ] {
-            only_one("the axes", &[a, b])?;
-        }
-        let missing = |key: &str| {
-            let error = Error::new(Kind::Scene, format!("the axes have no `{key}`"));
-            Refused::from(error.label(format!("`{key}` is missing")).help(AXES))
-        };
-        let is_plane = geometry().is_plane();
-        let [first, second, axis] = [first, second, axis].map(|direction| direction.map(|direction| direction.value.0));
-        if let Some(angle) = angle {
-            let along_z = is_plane.then(|| [0.0, 0.0, 1.0].map(Field::Constant));
-            let axis = axis.or(along_z).ok_or_else(|| missing("axis"))?;
-            return Ok(Self::Angle { angle: angle.value, axis });
-        }
-        let first = first.ok_or_else(|| missing("first"))?;
-        if second.is_none() && !is_plane {
-            return Err(missing("second"));
-        }
-        Ok(Self::Directions { first, second })
     }
 }

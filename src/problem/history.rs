@@ -5,10 +5,12 @@
 //! In a scene they are `steps` of `[method]`: factors of all loads, or a table with a factor for each load.
 
 use super::body::BodySpec;
+use super::check::{Check, Fault, positive};
+use super::compile::{Compile, Names};
 use super::contact::ContactSpec;
 use super::geometry::Geometry;
 use super::load::{LoadKind, Support};
-use super::read::{Check, Either, Flaw, Form, file, kept, positive};
+use super::read::{Either, Form, refused};
 use crate::error::{Error, Located, Result as Checked, joined};
 use crate::expression::Field;
 use crate::file::{other_encoding, with_unix_lines};
@@ -142,9 +144,9 @@ pub fn paths(body: &BodySpec) -> impl Iterator<Item = &Located<String>> {
 fn has_common(body: &BodySpec) -> bool {
     let acts = |kind: &LoadKind| match kind {
         LoadKind::Pressure(pressure) => !pressure.is_zero(),
-        LoadKind::Traction(traction) => !traction.iter().all(Field::is_zero),
-        LoadKind::Force { total, .. } | LoadKind::Moment(total) => total.iter().any(|force| *force != 0.0),
-        LoadKind::Turning { force, moment } => force.iter().chain(moment).any(|component| *component != 0.0),
+        LoadKind::Traction(vector) | LoadKind::Force { total: vector, .. } => !vector.iter().all(Field::is_zero),
+        LoadKind::Moment(moment) => !moment.fields().iter().all(Field::is_zero),
+        LoadKind::Turning { force, moment } => !force.iter().chain(moment.fields()).all(Field::is_zero),
     };
     body.force.as_ref().is_some_and(|force| !force.iter().all(Field::is_zero))
         || body.load.iter().any(|load| load.path.is_none() && acts(&load.kind))
@@ -164,7 +166,7 @@ const OWN_COLUMNS: [&str; 4] = ["step", "status", "iterations", "residual"];
 #[serde(deny_unknown_fields)]
 struct StepsKeys {
     /// CSV file with a column of each factor
-    table: Located<String>,
+    table: Located<PathBuf>,
 }
 
 /// So many equal load steps, a list of factors, or the table of a file.
@@ -175,14 +177,24 @@ impl<'de> Deserialize<'de> for History {
             Form::Integer(count) if (1..=MOST_STEPS).contains(&count) => {
                 Ok(History::of_shares((1..=count).map(|step| step as f64 / count as f64).collect()))
             }
-            Form::Integer(count) => Err(kept(
+            Form::Integer(count) => Err(refused(
                 Error::scene(&place, format!("`steps` is {count}"))
                     .label(format!("the number of load steps must lie between 1 and {MOST_STEPS}")),
             )),
             Form::List(factors) => Ok(History::of_shares(factors)),
-            Form::Table(keys) => file(keys.table).and_then(read_table).map_err(kept),
-            other => Err(other.unexpected()),
+            Form::Table(StepsKeys { table }) => Ok(History { table: Some(table), ..History::default() }),
+            other => Err(other.instead_of("a whole number, a list or a table", &place)),
         }
+    }
+}
+
+/// The table of load steps is read.
+impl Compile for History {
+    fn compile(&mut self, names: &Names<'_>) -> Checked<()> {
+        let Some(mut table) = self.table.take() else { return Ok(()) };
+        table.compile(names)?;
+        *self = read_table(table)?;
+        Ok(())
     }
 }
 
@@ -204,7 +216,7 @@ impl Serialize for History {
 
 impl Check for History {
     /// Check factors of all loads. Those of a table were checked when its file was read.
-    fn check(&self, _: Geometry) -> Result<(), Flaw> {
+    fn check(&self, _: Geometry) -> Result<(), Fault> {
         if self.is_table() {
             return Ok(());
         }
@@ -214,7 +226,7 @@ impl Check for History {
         match self.steps.last() {
             Some(last) if last.factors != [1.0] => {
                 let help = "end the list with 1; a table may end anywhere: steps = { table = \"path.csv\" }";
-                Err(Flaw::new("", "the last load step is not the full load", "", help))
+                Err(Fault::new("", "the last load step is not the full load", "", help))
             }
             _ => Ok(()),
         }

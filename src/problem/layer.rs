@@ -1,8 +1,10 @@
 //! Laws of layers p(c), pressure p over compression c, and their parameters.
 
+use super::check::{Check, Fault, positive};
+use super::compile::{Compile, Names, compile};
 use super::geometry::Geometry;
-use super::read::{Check, Flaw, Refused, expression, only_one, place, positive};
-use crate::error::{Error, Kind, Located, shown};
+use super::read::{Refusal, located, only_one, place};
+use crate::error::{Error, Kind, Located, Result as Checked, shown};
 use crate::expression::{Expression, Field};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -12,13 +14,13 @@ use serde::{Deserialize, Serialize};
 #[serde(try_from = "LayerKeys", rename_all = "lowercase")]
 pub enum LayerSpec {
     /// p = (c/B)^(1/a), the layer of the paper.
-    Power(Power),
+    Power(PowerSpec),
     /// p = stiffness c.
-    Linear(Linear),
+    Linear(LinearSpec),
     /// p = p0 (e^(c/c0) - 1).
-    Exponential(Exponential),
+    Exponential(ExponentialSpec),
     /// p = k1 c + k3 c^3.
-    Cubic(Cubic),
+    Cubic(CubicSpec),
     /// A monotone cubic curve through points (c, p). Both columns increase from (0, 0), which is not among the points.
     Table(Vec<[f64; 2]>),
     /// The law of this name from a Rust program ([`Scene::law`](crate::scene::Scene::law)).
@@ -37,7 +39,7 @@ pub enum LayerSpec {
 /// The parameters of the power law.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Power {
+pub struct PowerSpec {
     /// compression at unit pressure, > 0
     #[serde(rename = "B")]
     pub b: Field,
@@ -48,7 +50,7 @@ pub struct Power {
 /// The parameter of the linear law.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Linear {
+pub struct LinearSpec {
     /// pressure per compression, > 0
     pub stiffness: Field,
 }
@@ -56,7 +58,7 @@ pub struct Linear {
 /// The parameters of the exponential law.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Exponential {
+pub struct ExponentialSpec {
     /// a pressure, > 0
     pub p0: Field,
     /// a length, > 0
@@ -66,32 +68,50 @@ pub struct Exponential {
 /// The parameters of the cubic law.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Cubic {
+pub struct CubicSpec {
     /// stiffness at first touch, > 0
     pub k1: Field,
     /// coefficient of the cube, >= 0
     pub k3: Field,
 }
 
+compile!(PowerSpec { b, a } else {});
+compile!(LinearSpec { stiffness } else {});
+compile!(ExponentialSpec { p0, c0 } else {});
+compile!(CubicSpec { k1, k3 } else {});
+
+impl Compile for LayerSpec {
+    fn compile(&mut self, names: &Names<'_>) -> Checked<()> {
+        match self {
+            Self::Power(law) => law.compile(names),
+            Self::Linear(law) => law.compile(names),
+            Self::Exponential(law) => law.compile(names),
+            Self::Cubic(law) => law.compile(names),
+            Self::Pressure { law, .. } => law.compile(&names.with(&[&["c"], names.variables].concat())),
+            Self::Table(_) | Self::Own(_) => Ok(()),
+        }
+    }
+}
+
 impl LayerSpec {
     /// Return p = (c/B)^(1/a) with B > 0 and a in (0, 1], the layer of the paper.
     pub fn power(b: impl Into<Field>, a: impl Into<Field>) -> Self {
-        Self::Power(Power { b: b.into(), a: a.into() })
+        Self::Power(PowerSpec { b: b.into(), a: a.into() })
     }
 
     /// Return p = `stiffness` c with a stiffness (stress per length) > 0.
     pub fn linear(stiffness: impl Into<Field>) -> Self {
-        Self::Linear(Linear { stiffness: stiffness.into() })
+        Self::Linear(LinearSpec { stiffness: stiffness.into() })
     }
 
     /// Return p = p0 (e^(c/c0) - 1) with a stress p0 > 0 and a length c0 > 0.
     pub fn exponential(p0: impl Into<Field>, c0: impl Into<Field>) -> Self {
-        Self::Exponential(Exponential { p0: p0.into(), c0: c0.into() })
+        Self::Exponential(ExponentialSpec { p0: p0.into(), c0: c0.into() })
     }
 
     /// Return p = k1 c + k3 c^3 with k1 > 0 and k3 >= 0.
     pub fn cubic(k1: impl Into<Field>, k3: impl Into<Field>) -> Self {
-        Self::Cubic(Cubic { k1: k1.into(), k3: k3.into() })
+        Self::Cubic(CubicSpec { k1: k1.into(), k3: k3.into() })
     }
 
     /// Return the name of the law and its parameters, for a law that has some.
@@ -156,13 +176,17 @@ impl Bounds {
 #[serde(deny_unknown_fields)]
 struct LayerKeys {
     /// write power = { B = ..., a = ... }
-    power: Option<Located<Power>>,
+    #[serde(default, deserialize_with = "located")]
+    power: Option<Located<PowerSpec>>,
     /// write linear = { stiffness = ... }
-    linear: Option<Located<Linear>>,
+    #[serde(default, deserialize_with = "located")]
+    linear: Option<Located<LinearSpec>>,
     /// write exponential = { p0 = ..., c0 = ... }
-    exponential: Option<Located<Exponential>>,
+    #[serde(default, deserialize_with = "located")]
+    exponential: Option<Located<ExponentialSpec>>,
     /// write cubic = { k1 = ..., k3 = ... }
-    cubic: Option<Located<Cubic>>,
+    #[serde(default, deserialize_with = "located")]
+    cubic: Option<Located<CubicSpec>>,
     /// write table = [[1e-5, 2], [2e-5, 10]]: compressions and pressures, both increasing from 0
     table: Option<Located<Vec<Located<Vec<f64>>>>>,
     /// p as an expression in c and the coordinates: pressure = "1e5*c + 1e9*c^2"
@@ -172,9 +196,9 @@ struct LayerKeys {
 }
 
 impl TryFrom<LayerKeys> for LayerSpec {
-    type Error = Refused;
+    type Error = Refusal;
 
-    fn try_from(keys: LayerKeys) -> Result<Self, Refused> {
+    fn try_from(keys: LayerKeys) -> Result<Self, Refusal> {
         let LayerKeys { power, linear, exponential, cubic, table, pressure, up_to } = keys;
         let given = [
             ("power", place(&power)),
@@ -192,7 +216,7 @@ impl TryFrom<LayerKeys> for LayerSpec {
         }
         let law = match pressure {
             Some(text) => {
-                let law = expression(&text, &text.place, &["c"])?;
+                let law = Expression::uncompiled(&text.value, text.place);
                 Some(Self::Pressure { law, up_to: up_to.map(|end| end.value) })
             }
             None => table.map(|points| of_points(points.value)).transpose()?,
@@ -209,13 +233,12 @@ impl TryFrom<LayerKeys> for LayerSpec {
 }
 
 /// Return the law through points (c, p).
-fn of_points(given: Vec<Located<Vec<f64>>>) -> Result<LayerSpec, Refused> {
+fn of_points(given: Vec<Located<Vec<f64>>>) -> Checked<LayerSpec> {
     let mut points: Vec<[f64; 2]> = Vec::new();
     for point in given {
         let &[c, p] = &point.value[..] else {
             return Err(Error::scene(&point.place, "a point of the table is a compression and a pressure")
-                .help("write table = [[1e-5, 2], [2e-5, 10]]: compressions and pressures, both increasing from 0")
-                .into());
+                .help("write table = [[1e-5, 2], [2e-5, 10]]: compressions and pressures, both increasing from 0"));
         };
         points.push([c, p]);
     }
@@ -226,14 +249,14 @@ fn of_points(given: Vec<Located<Vec<f64>>>) -> Result<LayerSpec, Refused> {
 }
 
 impl Check for LayerSpec {
-    fn check(&self, _: Geometry) -> Result<(), Flaw> {
+    fn check(&self, _: Geometry) -> Result<(), Fault> {
         let (law, parameters) = self.parameters();
         for Parameter { key, value, bounds } in parameters {
             let Field::Constant(value) = *value else { continue };
             let Some(breach) = bounds.breach(value) else { continue };
             let steep = "p(c) = (c/B)^(1/a) with a > 1 is infinitely stiff at first touch, p'(0) = infinity";
             let help = if breach == "must not exceed 1" { steep } else { "" };
-            return Err(Flaw::new(format!("{law}.{key}"), format!("{key} is {}", shown(value)), breach, help));
+            return Err(Fault::new(format!("{law}.{key}"), format!("{key} is {}", shown(value)), breach, help));
         }
         match self {
             LayerSpec::Table(points) => check_table(points),
@@ -244,16 +267,16 @@ impl Check for LayerSpec {
 }
 
 /// Check that compressions and pressures (c, p) increase from (0, 0).
-fn check_table(points: &[[f64; 2]]) -> Result<(), Flaw> {
+fn check_table(points: &[[f64; 2]]) -> Result<(), Fault> {
     if points.is_empty() {
-        return Err(Flaw::new("table", "the table has no point", "", "write table = [[1e-5, 2], [2e-5, 10]]"));
+        return Err(Fault::new("table", "the table has no point", "", "write table = [[1e-5, 2], [2e-5, 10]]"));
     }
     for (before, point) in std::iter::once(&[0.0; 2]).chain(points).zip(points) {
         for (k, what) in ["compression", "pressure"].into_iter().enumerate() {
             if point[k] <= before[k] || !point[k].is_finite() {
                 let values = [point[k], before[k]].map(shown).join(" of the table does not exceed ");
                 let help = "a layer's law increases from p(0) = 0";
-                return Err(Flaw::new("table", format!("the {what} {values}"), "", help));
+                return Err(Fault::new("table", format!("the {what} {values}"), "", help));
             }
         }
     }

@@ -1,8 +1,10 @@
 //! Where meshes come from.
 
+use super::check::{Check, Fault, at_least_one, positive};
+use super::compile::{Compile, Names, find};
 use super::geometry::Geometry;
 use super::order::Order;
-use super::read::{Check, Either, Flaw, Form, at_least_one, file, kept, only_one, place, place_of, positive};
+use super::read::{Either, Form, only_one, place, refused, unplaced};
 use crate::error::{Error, Kind, Located, Place, Result as Checked, Source};
 use schemars::JsonSchema;
 use serde::de::IgnoredAny;
@@ -37,9 +39,11 @@ impl Default for Guard {
 #[serde(deny_unknown_fields)]
 struct MeshKeys {
     /// a Gmsh script, or a shape (.step, .iges, .brep, .stl), relative to the scene's folder
-    geo: Option<Located<String>>,
+    #[schemars(with = "Option<String>")]
+    geo: Option<Located<PathBuf>>,
     /// a mesh: Gmsh's .msh, or a format that Gmsh converts
-    msh: Option<Located<String>>,
+    #[schemars(with = "Option<String>")]
+    msh: Option<Located<PathBuf>>,
     /// numbers for the script: set = { n = 32 }
     #[schemars(with = "Option<BTreeMap<String, f64>>")]
     set: Option<Located<BTreeMap<Spanned<String>, f64>>>,
@@ -109,9 +113,10 @@ impl MeshSource {
     /// There is no such file.
     pub fn of_argument(path: &Path) -> Checked<Self> {
         let text = path.display().to_string();
-        let place =
-            Place { span: 0..text.len(), source: Arc::new(Source { name: "argument".to_owned(), text: text.clone() }) };
-        MeshKeys::of_name(Located::new(text, place)).source()
+        let place = Place { span: 0..text.len(), source: Arc::new(Source { name: "argument".to_owned(), text }) };
+        let mut file = Located::new(path.to_owned(), place);
+        find(&mut file, Path::new(""))?;
+        MeshKeys::of_name(file).source()
     }
 
     /// Return a mesh file with named groups: `.msh` of Gmsh, or a format that Gmsh converts.
@@ -133,16 +138,15 @@ pub fn is_shape(path: &Path) -> bool {
 
 impl MeshKeys {
     /// Return the keys that the name of a file stands for.
-    fn of_name(name: Located<String>) -> Self {
-        let path = Path::new(&name.value);
-        if is_shape(path) || path.extension().is_some_and(|ending| ending == "geo") {
+    fn of_name(name: Located<PathBuf>) -> Self {
+        if is_shape(&name) || name.extension().is_some_and(|ending| ending == "geo") {
             Self { geo: Some(name), ..Self::default() }
         } else {
             Self { msh: Some(name), ..Self::default() }
         }
     }
 
-    /// Return the mesh. Its file must exist; it is not read.
+    /// Return the mesh.
     fn source(self) -> Checked<MeshSource> {
         only_one("the mesh", &[("geo", place(&self.geo)), ("msh", place(&self.msh))])?;
         let of_gmsh = [
@@ -151,8 +155,7 @@ impl MeshKeys {
             ("threads", place(&self.threads)),
             ("timeout", place(&self.timeout)),
         ];
-        if let Some(name) = self.msh {
-            let file = file(name)?;
+        if let Some(file) = self.msh {
             if is_shape(&file) {
                 return Err(Error::scene(&file.place, "this is the shape of bodies, and no mesh")
                     .help("mesh = { geo = \"...\", size = 0.1 }"));
@@ -163,12 +166,11 @@ impl MeshKeys {
                     .help("it is for Gmsh, which makes meshes from scripts: mesh = { geo = \"...\" }")),
             };
         }
-        let Some(name) = self.geo else {
+        let Some(file) = self.geo else {
             return Err(Error::new(Kind::Scene, "the mesh has no `geo`")
                 .label("`geo` is missing")
                 .help("write the name of a file, or mesh = { geo = \"a.geo\", set = { n = 32 } }"));
         };
-        let file = file(name)?;
         if let (Some(size), false) = (&self.size, is_shape(&file)) {
             return Err(Error::scene(&size.place, "`size` for a script, which has sizes of its own")
                 .help("it is for shapes (.step, .iges, .brep, .stl): give scripts numbers by set = { n = 32 }"));
@@ -176,7 +178,7 @@ impl MeshKeys {
         let numbers = self.set.map(|set| set.value).unwrap_or_default();
         let mut set = Vec::new();
         for (name, number) in numbers {
-            let place = place_of(name.span());
+            let place = unplaced(name.span());
             check_number(name.get_ref(), number, &place)?;
             set.push((Located::new(name.into_inner(), place), number));
         }
@@ -205,11 +207,25 @@ fn check_number(name: &str, number: f64, place: &Place) -> Checked<()> {
 }
 
 impl Check for MeshSource {
-    fn check(&self, _: Geometry) -> Result<(), Flaw> {
+    fn check(&self, _: Geometry) -> Result<(), Fault> {
         let Self::Geo(GmshSource { guard, .. }) = self else { return Ok(()) };
         positive("timeout", "the timeout", guard.seconds)?;
         guard.threads.map_or(Ok(()), |threads| at_least_one("threads", threads))?;
         guard.size.map_or(Ok(()), |size| positive("size", "the size", size))
+    }
+}
+
+/// The file must be there; it is not read.
+impl Compile for MeshSource {
+    fn compile(&mut self, names: &Names<'_>) -> Checked<()> {
+        match self {
+            Self::Geo(GmshSource { file, set, .. }) => {
+                set.iter_mut().try_for_each(|(name, _)| name.compile(names))?;
+                file.compile(names)
+            }
+            Self::Msh { file } => file.compile(names),
+            Self::Arrays(_) => Ok(()),
+        }
     }
 }
 
@@ -218,11 +234,11 @@ impl<'de> Deserialize<'de> for MeshSource {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let Located { value, place } = Located::<Form<IgnoredAny, MeshKeys>>::deserialize(deserializer)?;
         let keys = match value {
-            Form::Text(name) => MeshKeys::of_name(Located::new(name, place)),
+            Form::Text(name) => MeshKeys::of_name(Located::new(name.into(), place)),
             Form::Table(keys) => keys,
-            other => return Err(other.unexpected()),
+            other => return Err(other.instead_of("a string or a table", &place)),
         };
-        keys.source().map_err(kept)
+        keys.source().map_err(refused)
     }
 }
 

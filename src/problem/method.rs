@@ -1,18 +1,15 @@
 //! The outer iteration, its rules, and inner solvers by name.
 
+use super::check::{Check, Fault, at_least_one, positive};
+use super::compile::{Compile, Names};
 use super::geometry::Geometry;
 use super::history::History;
-use super::read::{
-    Check, Either, Flaw, Form, at_least_one, checked, condition, kept, of_iteration, of_word, positive, word,
-};
-use crate::error::{Error, Located, shown};
-use crate::expression::Field;
+use super::read::{Either, Form, of_word, refused, table, word};
+use crate::error::{Error, Located, Place, Result as Checked, shown};
+use crate::expression::{Expression, Field, coordinates};
 use schemars::JsonSchema;
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use std::ops::Range;
-use toml::Spanned;
-use toml::de::{DeTable, DeValue};
 
 /// The outer iteration.
 #[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
@@ -21,7 +18,7 @@ pub struct MethodSpec {
     /// the method
     ///
     /// A scene file without a name means [`MethodName::Robin`] if psi, gamma, robin or the increment rule is given
-    /// ([`complete`]).
+    /// ([`MethodSpec::complete`]).
     pub name: MethodName,
     /// Robin zone: "none", "full", "active", a condition, or a list of one for each side
     pub psi: Zone,
@@ -38,10 +35,9 @@ pub struct MethodSpec {
     /// start of the iteration: "auto", "zero" or { normal = 1e-4 }
     pub start: Start,
     /// load steps: a number, shares that end with 1, or a table
-    #[serde(deserialize_with = "checked")]
     pub steps: History,
     /// when to stop: stop = { residual = 1e-8 }
-    #[serde(deserialize_with = "checked")]
+    #[serde(deserialize_with = "table")]
     pub stop: StopRule,
 }
 
@@ -51,80 +47,82 @@ impl MethodSpec {
         let robin = if name == MethodName::Robin { RobinRule::Tangent } else { RobinRule::Auto };
         Self { name, robin, ..Self::default() }
     }
+
+    /// Set the defaults that depend on other keys of a scene file: the method and coefficient of the paper where its
+    /// keys are used, and the tolerance of the residual where no rule is given. `find` returns the place of a key of
+    /// `[method]` that is given.
+    ///
+    /// # Errors
+    /// A key that the method does not read.
+    pub fn complete(&mut self, find: impl Fn(&str) -> Option<Place>) -> Checked<()> {
+        let is_given = |key: &str| find(key).is_some();
+        let is_paper = self.stop.increment.is_some() || ["psi", "gamma", "robin"].into_iter().any(is_given);
+        if is_paper && !is_given("name") {
+            self.name = MethodName::Robin;
+        }
+        if self.name == MethodName::Robin && !is_given("robin") {
+            self.robin = RobinRule::Tangent;
+        }
+        if self.stop.increment.is_none() {
+            self.stop.residual.get_or_insert(TOLERANCE);
+        }
+        self.refuse_idle(find)
+    }
+
+    /// Refuse a key that the method does not read. A key of the file may stand there if an option of the command line
+    /// has replaced the method.
+    fn refuse_idle(&self, find: impl Fn(&str) -> Option<Place>) -> Checked<()> {
+        let is_option = |place: &Place| place.source.name.starts_with("--");
+        let is_replaced = find("name").is_some_and(|name| is_option(&name));
+        let by_sweeps = self.linear == Some(Linear::Sweeps);
+        let has_sweeps = match self.name {
+            MethodName::Auto => self.linear.is_none() || by_sweeps,
+            MethodName::Newton | MethodName::Semismooth => by_sweeps,
+            MethodName::Robin | MethodName::NewtonRobin => true,
+        };
+        let has_gamma = matches!(self.name, MethodName::Robin | MethodName::Semismooth);
+        let gamma = ("gamma", has_gamma, "`robin` and `semismooth`");
+        let zone = ["psi", "robin"].map(|key| (key, has_sweeps, "`robin` and `newton-robin`"));
+        for (key, _, readers) in [gamma].into_iter().chain(zone).filter(|(_, is_read, _)| !is_read) {
+            let Some(place) = find(key).filter(|place| is_option(place) || !is_replaced) else { continue };
+            return Err(Error::scene(&place, format!("the method `{}` does not read `{key}`", self.name.name()))
+                .label("no effect")
+                .help(format!("leave it out, or choose a method that reads it: {readers}")));
+        }
+        Ok(())
+    }
 }
 
-/// Write those defaults of `[method]` into its table that depend on other keys. The scene calls this after the
-/// overrides of the command line and before serde reads the table, so that the echo in the report has them like typed
-/// keys. They are the method and coefficient of the paper where its keys are used, and the tolerance of the residual.
-pub fn complete(method: &mut Spanned<DeValue<'_>>) {
-    // what is written here has no place in the text
-    let span = method.span().end..method.span().end;
-    let DeValue::Table(method) = method.get_mut() else { return };
-    let mut by_increment = false;
-    if let Some(DeValue::Table(stop)) = method.get_mut("stop").map(Spanned::get_mut) {
-        by_increment = stop.contains_key("increment");
-        if !by_increment && !stop.contains_key("residual") {
-            let residual = DeValue::parse(TOLERANCE).map_or(DeValue::Boolean(false), Spanned::into_inner);
-            stop.insert(Spanned::new(span.clone(), "residual".into()), Spanned::new(span.clone(), residual));
+/// The zone has the iteration k as a variable, too; gamma has no other.
+impl Compile for MethodSpec {
+    fn compile(&mut self, names: &Names<'_>) -> Checked<()> {
+        let Self { psi, gamma, start, name: _, robin: _, interval: _, linear: _, steps: _, stop: _ } = self;
+        psi.compile(&names.with(&coordinates(names.dimension, true)))?;
+        if let Gamma::Expression(gamma) = gamma {
+            gamma.compile(&names.with(&["k"]))?;
+        }
+        if let Start::Normal(start) = start { start.compile(names) } else { Ok(()) }
+    }
+}
+
+impl Compile for Zone {
+    fn compile(&mut self, names: &Names<'_>) -> Checked<()> {
+        match self {
+            Self::Subset(condition) => condition.compile(names),
+            Self::Sides(zones) => zones.iter_mut().try_for_each(|zone| zone.compile(names)),
+            Self::None | Self::Full | Self::Active => Ok(()),
         }
     }
-    let put = |method: &mut DeTable<'_>, key: &'static str, word: &'static str| {
-        method.insert(Spanned::new(span.clone(), key.into()), Spanned::new(span.clone(), DeValue::String(word.into())));
-    };
-    let is_paper = by_increment || ["psi", "gamma", "robin"].iter().any(|key| method.contains_key(*key));
-    if is_paper && !method.contains_key("name") {
-        put(method, "name", "robin");
-    }
-    let is_robin = matches!(method.get("name").map(Spanned::get_ref), Some(DeValue::String(name)) if name == "robin");
-    if is_robin && !method.contains_key("robin") {
-        put(method, "robin", "tangent");
-    }
-}
-
-/// A key of `[method]` that the method of the scene does not read.
-pub struct IdleKey {
-    /// The key.
-    pub name: &'static str,
-    /// The place of its value.
-    pub span: Range<usize>,
-    /// The method.
-    pub method: String,
-    /// The methods that read it.
-    pub readers: &'static str,
-}
-
-/// Return a key of the [`complete`] table `[method]` that its method does not read. A key of the file may stand there
-/// if an option of the command line has replaced the method. `is_option` tells whether a place is in such an option.
-pub fn idle_key(method: &Spanned<DeValue<'_>>, is_option: impl Fn(&Range<usize>) -> bool) -> Option<IdleKey> {
-    let DeValue::Table(table) = method.get_ref() else { return None };
-    let word = |key: &str| table.get(key).and_then(|value| value.get_ref().as_str());
-    let (name, linear) = (word("name").unwrap_or("auto"), word("linear"));
-    if !["auto", "newton", "newton-robin", "semismooth"].contains(&name) {
-        return None;
-    }
-    let is_replaced = table.get("name").is_some_and(|name| is_option(&name.span()));
-    let has_sweeps = match name {
-        "auto" => linear.is_none_or(|linear| linear == "sweeps"),
-        "newton" | "semismooth" => linear == Some("sweeps"),
-        _ => true,
-    };
-    let gamma = ("gamma", name == "semismooth", "`robin` and `semismooth`");
-    let zone = ["psi", "robin"].map(|key| (key, has_sweeps, "`robin` and `newton-robin`"));
-    [gamma].into_iter().chain(zone).filter(|(_, is_read, _)| !is_read).find_map(|(key, _, readers)| {
-        let span = table.get(key)?.span();
-        let is_idle = is_option(&span) || !is_replaced;
-        is_idle.then(|| IdleKey { name: key, span, method: name.to_owned(), readers })
-    })
 }
 
 impl Check for MethodSpec {
     /// Check all but steps and stop rule, which are checked by themselves.
-    fn check(&self, _: Geometry) -> Result<(), Flaw> {
+    fn check(&self, _: Geometry) -> Result<(), Fault> {
         match &self.gamma {
             Gamma::Stationary(gamma) => positive("gamma", "gamma", *gamma)?,
             Gamma::Schedule(list) if list.is_empty() => {
                 let help = "write a number, a list of numbers, or the name of a rule";
-                return Err(Flaw::new("gamma", "gamma has no value", "", help));
+                return Err(Fault::new("gamma", "gamma has no value", "", help));
             }
             Gamma::Schedule(list) => {
                 let one = |(k, gamma): (usize, &f64)| positive(&format!("gamma.{k}"), "gamma", *gamma);
@@ -134,7 +132,7 @@ impl Check for MethodSpec {
                 let of = |k: usize| gamma.in_iteration(k);
                 if let Some(k) = (0..self.stop.iterations.min(MOST)).find(|k| !(of(*k) > 0.0 && of(*k).is_finite())) {
                     let message = format!("gamma is {} in iteration k = {k}", shown(of(k)));
-                    return Err(Flaw::new("gamma", message, "must be greater than 0", ""));
+                    return Err(Fault::new("gamma", message, "must be greater than 0", ""));
                 }
             }
             Gamma::LineSearch | Gamma::Aitken | Gamma::Own(_) => {}
@@ -144,11 +142,11 @@ impl Check for MethodSpec {
         }
         if self.linear.is_some() && matches!(self.name, MethodName::Robin | MethodName::NewtonRobin) {
             let help = "name = \"newton\", or leave `linear` away";
-            return Err(Flaw::new("linear", "only Newton's method has linear steps of all bodies", "", help));
+            return Err(Fault::new("linear", "only Newton's method has linear steps of all bodies", "", help));
         }
         if self.interval && self.name != MethodName::Robin {
             let help = "name = \"robin\", or leave `interval` away";
-            return Err(Flaw::new("interval", "only the method `robin` has an interval of gamma", "", help));
+            return Err(Fault::new("interval", "only the method `robin` has an interval of gamma", "", help));
         }
         Ok(())
     }
@@ -159,7 +157,7 @@ impl Check for MethodSpec {
 const MOST: usize = 1_000_000;
 
 /// The methods.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum MethodName {
     /// Newton's method, with the kind of linear step that suits the bodies, the memory and the number of ranks.
@@ -311,7 +309,7 @@ pub struct StopRule {
 }
 
 /// Tolerance of the residual without a rule.
-const TOLERANCE: &str = "1e-8";
+const TOLERANCE: f64 = 1e-8;
 
 fn iterations() -> usize {
     2000
@@ -319,7 +317,7 @@ fn iterations() -> usize {
 
 impl Default for StopRule {
     fn default() -> Self {
-        Self { residual: TOLERANCE.parse().ok(), increment: None, iterations: iterations() }
+        Self { residual: Some(TOLERANCE), increment: None, iterations: iterations() }
     }
 }
 
@@ -339,10 +337,10 @@ impl StopRule {
 }
 
 impl Check for StopRule {
-    fn check(&self, _: Geometry) -> Result<(), Flaw> {
+    fn check(&self, _: Geometry) -> Result<(), Fault> {
         at_least_one("iterations", self.iterations)?;
         if self.residual.or(self.increment).is_none() {
-            return Err(Flaw::new("", "a stop rule has a tolerance", "", "stop = { residual = 1e-8 }"));
+            return Err(Fault::new("", "a stop rule has a tolerance", "", "stop = { residual = 1e-8 }"));
         }
         for (key, tolerance) in [("residual", self.residual), ("increment", self.increment)] {
             tolerance.map_or(Ok(()), |tolerance| positive(key, "the tolerance", tolerance))?;
@@ -395,10 +393,11 @@ impl Preset {
 
 impl<'de> Deserialize<'de> for SolverSpec {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        match Form::<IgnoredAny, SolverKeys>::deserialize(deserializer)? {
+        let Located { value, place } = Located::<Form<IgnoredAny, SolverKeys>>::deserialize(deserializer)?;
+        match value {
             Form::Text(word) => of_word(&word).map(|preset| Self { preset: Some(preset) }),
             Form::Table(SolverKeys { preset }) => Ok(Self { preset }),
-            other => Err(other.unexpected()),
+            other => Err(other.instead_of("a string or a table", &place)),
         }
     }
 }
@@ -422,8 +421,8 @@ impl<'de> Deserialize<'de> for Gamma {
                 Rule::LineSearch => Self::LineSearch,
                 Rule::Aitken => Self::Aitken,
             }),
-            Form::Text(text) => of_iteration(&text, &place).map(Self::Expression).map_err(kept),
-            other => Err(other.unexpected()),
+            Form::Text(text) => Ok(Self::Expression(Field::Expression(Expression::uncompiled(&text, place)))),
+            other => Err(other.instead_of("a number, an expression, a word or a list", &place)),
         }
     }
 }
@@ -445,12 +444,12 @@ impl<'de> Deserialize<'de> for Zone {
                 }
                 _ => {
                     let error = Error::scene(&place, "a list of zones has one for each of the two sides");
-                    return Err(kept(
+                    return Err(refused(
                         error.help("psi = [\"active\", \"none\"]: the first is that of the first surface of `between`"),
                     ));
                 }
             },
-            other => return Err(other.unexpected()),
+            other => return Err(other.instead_of("a string or a list of two", &place)),
         };
         match text.as_str() {
             "none" => return Ok(Self::None),
@@ -461,9 +460,9 @@ impl<'de> Deserialize<'de> for Zone {
         if is_word(&text) {
             let otherwise = || "psi is none, full, active, or a condition such as \"x > 1 && k < 5\"".to_owned();
             let error = Error::scene(&place, format!("unknown zone `{text}`"));
-            return Err(kept(error.suggest(&text, ["none", "full", "active"], otherwise)));
+            return Err(refused(error.suggest(&text, ["none", "full", "active"], otherwise)));
         }
-        condition(&text, &place, true).map(Self::Subset).map_err(kept)
+        Ok(Self::Subset(Field::Expression(Expression::uncompiled(&text, place))))
     }
 }
 

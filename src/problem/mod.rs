@@ -2,13 +2,16 @@
 //!
 //! A key of the scene is a field: its type, its default, and its doc comment, whose first paragraph is shown in
 //! refusals and in the JSON schema. serde reads and writes the structs, schemars describes them. Tables whose keys
-//! exclude each other have a struct of keys (`...Keys`) and become an enum. Values that are impossible or contradict
-//! each other are refused beside their struct ([`Check`](read::Check)), for scenes from files and from Rust alike.
+//! exclude each other have a struct of keys (`...Keys`) and become an enum. What serde has read is completed once the
+//! whole scene is known ([`Compile`](compile::Compile)). Values that are impossible or contradict each other are refused
+//! beside their struct ([`Check`](check::Check)), for scenes from files and from Rust alike.
 //!
 //! Names of groups keep the place where they were written ([`Located`](crate::error::Located)): the mesh is read later,
 //! and a refusal of a group that it does not have points there.
 
 pub mod body;
+pub mod check;
+pub mod compile;
 pub mod contact;
 pub mod data;
 pub mod elasticity;
@@ -29,10 +32,11 @@ pub use elasticity::{AxesSpec, Constants, ElasticitySpec, Orthotropic, RegionSpe
 pub use geometry::Plane;
 pub use history::{History, LoadStep};
 pub use layer::LayerSpec;
-pub use load::{Load, LoadKind, SpringKind, SpringSpec, Support};
+pub use load::{Load, LoadKind, SpringSpec, Support};
 pub use mesh::{GmshSource, GroupArrays, Guard, MeshArrays, MeshSource};
 pub use method::{Gamma, Linear, MethodName, MethodSpec, Preset, RobinRule, SolverSpec, Start, StopRule, Zone};
 pub use order::Order;
+pub use read::{OneOrVector, Vector};
 pub use units::{Units, label};
 
 use crate::error::{Error, Kind, Result};

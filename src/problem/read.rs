@@ -1,227 +1,55 @@
-//! What all settings share when they are read and written by serde: where the text stands, expressions, vectors, values
-//! with several forms, and the checks of tables.
+//! What settings share when they are read and written by serde: the spans of values, values with several forms,
+//! expressions, vectors.
 //!
-//! serde hands a value no more than itself. What else reading needs, the [`Context`], is kept aside for the thread
-//! while a scene is read ([`within`]): the texts that places point into, the folder of the scene, its dimension, and
-//! its data. So expressions are compiled as they are read. A refusal that has more to say than an error of serde can
-//! hold is kept aside, too, and [`refusal`] takes it back.
+//! This is the first pass of reading a scene. It refuses what is wrong in itself; what depends on the rest of the scene
+//! waits for the second pass ([`compile`](super::compile)) and the checks ([`Check`](super::check::Check)).
 
-use super::geometry::{Geometry, Plane};
-use crate::data::Library;
-use crate::error::{Error, Kind, Located, Place, Result as Checked, Source, shown};
-use crate::expression::{Expression, Field, KnownNames, coordinates};
+use super::check::Fault;
+use super::compile::{Compile, Names};
+use super::geometry::Geometry;
+use crate::error::{Error, Located, Place, Result as Checked, Source};
+use crate::expression::{Expression, Field};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::value::MapAccessDeserializer;
-use serde::de::{self, Deserializer, IgnoredAny, MapAccess, SeqAccess, Unexpected, Visitor};
+use serde::de::{self, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Serialize, Serializer};
 use std::borrow::Cow;
-use std::cell::RefCell;
 use std::fmt;
 use std::marker::PhantomData;
-use std::ops::{Deref, Range};
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::ops::{Deref, Index, Range};
+use std::sync::{Arc, LazyLock};
 use toml::Spanned;
 
-/// The texts that a scene is read from: its file and the options that change it. The spans of all values count through
-/// one after the other.
-#[derive(Debug, Clone, Default)]
-pub struct Sources(Vec<(usize, Arc<Source>)>);
+/// The text of places that are spans as yet.
+static NOWHERE: LazyLock<Arc<Source>> = LazyLock::new(Arc::default);
 
-impl Sources {
-    /// Add a text; return where its spans begin.
-    pub fn add(&mut self, source: Arc<Source>) -> usize {
-        let begin = self.0.last().map_or(0, |(begin, last)| begin + last.text.len() + 1);
-        self.0.push((begin, source));
-        begin
-    }
-
-    /// Return the place of a span, moved into its text and onto whole characters.
-    pub fn place(&self, span: Range<usize>) -> Place {
-        let Some((begin, source)) = self.0.iter().rev().find(|(begin, _)| *begin <= span.start) else {
-            return Place::default();
-        };
-        let whole =
-            |at: usize| (0..=(at - begin).min(source.text.len())).rev().find(|at| source.text.is_char_boundary(*at));
-        let start = whole(span.start).unwrap_or(0);
-        Place { source: source.clone(), span: start..whole(span.end).unwrap_or(0).max(start) }
-    }
+/// Return a span as a place without its text.
+pub fn unplaced(span: Range<usize>) -> Place {
+    Place { source: NOWHERE.clone(), span }
 }
 
-/// What reading and writing need to know besides the values.
-#[derive(Debug, Clone)]
-pub struct Context {
-    /// Dimension and kind of the problem.
-    pub geometry: Geometry,
-    /// The texts.
-    pub sources: Sources,
-    /// Folder of the scene file.
-    pub folder: PathBuf,
-    /// Functions from files, by name.
-    pub data: Library,
-    /// Names of the factors of the load steps.
-    pub factors: Vec<String>,
-    /// The names that expressions of the key that is read may have.
-    pub names: Names,
-}
+/// A refusal on its way through serde, whose errors are texts.
+pub struct Refusal(pub Error);
 
-/// The kinds of names in an expression.
-#[derive(Debug, Clone, Copy)]
-pub struct Names {
-    coordinates: bool,
-    factors: bool,
-}
-
-impl Default for Context {
-    fn default() -> Self {
-        Self {
-            geometry: Geometry { dimension: 3, plane: Plane::Strain },
-            sources: Sources::default(),
-            folder: PathBuf::new(),
-            data: Library::new(),
-            factors: Vec::new(),
-            names: Names { coordinates: true, factors: false },
-        }
-    }
-}
-
-/// A refusal on its way through serde, and the span of the table that it is about, if it is known better than serde
-/// knows it.
-type Kept = (Flaw, Option<Range<usize>>);
-
-thread_local! {
-    static CONTEXT: RefCell<Context> = RefCell::default();
-    static KEPT: RefCell<Option<Kept>> = const { RefCell::new(None) };
-}
-
-/// Read or write something in a context.
-pub fn within<T>(context: Context, read: impl FnOnce() -> T) -> T {
-    CONTEXT.replace(context);
-    let result = read();
-    CONTEXT.take();
-    result
-}
-
-/// Return dimension and kind of the problem that is read or written.
-pub fn geometry() -> Geometry {
-    CONTEXT.with_borrow(|context| context.geometry)
-}
-
-/// Return the data of the scene that is read.
-pub fn data() -> Library {
-    CONTEXT.with_borrow(|context| context.data.clone())
-}
-
-/// Return the place of a span of the scene that is read.
-pub fn place_of(span: Range<usize>) -> Place {
-    CONTEXT.with_borrow(|context| context.sources.place(span))
-}
-
-/// Keep a refusal aside, and return the error of serde that stands for it.
-pub fn kept<E: de::Error>(error: Error) -> E {
-    keep(error.into(), None)
-}
-
-fn keep<E: de::Error>(flaw: Flaw, span: Option<Range<usize>>) -> E {
-    let message = flaw.error.message().to_owned();
-    KEPT.replace(Some((flaw, span)));
-    E::custom(message)
-}
-
-/// Stands for a refusal that is kept aside, where serde has a conversion: `#[serde(try_from)]`.
-pub struct Refused;
-
-impl From<Error> for Refused {
-    fn from(error: Error) -> Self {
-        KEPT.replace(Some((error.into(), None)));
-        Self
-    }
-}
-
-impl fmt::Display for Refused {
+impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("refused")
+        f.write_str(&self.0.packed())
     }
 }
 
-/// Return the refusal that was kept aside, if the reading ended with one. `span` is that of serde's error, and `key_in`
-/// returns the span of a key in the table with a span.
-pub fn refusal(
-    sources: &Sources,
-    span: Option<Range<usize>>,
-    key_in: impl Fn(&Range<usize>, &str) -> Option<Range<usize>>,
-) -> Option<Error> {
-    let (Flaw { key, error }, own) = KEPT.take()?;
-    let Some(span) = own.or(span) else { return Some(error) };
-    let span = if key.is_empty() { None } else { key_in(&span, &key) }.unwrap_or(span);
-    Some(error.or_at(&sources.place(span)))
-}
-
-/// A flaw of a table, and the key that it is about; below a key with a list its number may follow: `gamma.1`.
-pub struct Flaw {
-    key: String,
-    error: Error,
-}
-
-impl Flaw {
-    /// Return a flaw; `label` and `help` may be empty.
-    pub fn new(key: impl Into<String>, message: impl Into<String>, label: &str, help: &str) -> Self {
-        let error = Error::new(Kind::Scene, message).label(label);
-        Self { key: key.into(), error: if help.is_empty() { error } else { error.help(help) } }
-    }
-}
-
-/// A refusal with a place, or without one if it is about the whole table.
-impl From<Error> for Flaw {
+impl From<Error> for Refusal {
     fn from(error: Error) -> Self {
-        Self { key: String::new(), error }
+        Self(error)
     }
 }
 
-/// A table whose values may be impossible or contradict each other. It is checked while it is read, and as a part of a
-/// scene built in Rust.
-pub trait Check {
-    /// Find the first flaw.
-    fn check(&self, geometry: Geometry) -> Result<(), Flaw>;
-
-    /// Refuse the table for its first flaw, at `near` if there is no better place.
-    ///
-    /// # Errors
-    /// The flaw.
-    fn refuse(&self, geometry: Geometry, near: &Place) -> Checked<()> {
-        self.check(geometry).map_err(|flaw| flaw.error.or_at(near))
-    }
+/// Return the error of serde that stands for a refusal.
+pub fn refused<E: de::Error>(error: Error) -> E {
+    E::custom(Refusal(error))
 }
 
-/// A table that need not be there.
-impl<T: Check> Check for Option<T> {
-    fn check(&self, geometry: Geometry) -> Result<(), Flaw> {
-        self.as_ref().map_or(Ok(()), |table| table.check(geometry))
-    }
-}
-
-/// Refuse a number that is not finite and > 0.
-///
-/// # Errors
-/// The flaw of the key.
-pub fn positive(key: &str, what: &str, value: f64) -> Result<(), Flaw> {
-    if value > 0.0 && value.is_finite() {
-        Ok(())
-    } else {
-        Err(Flaw::new(key, format!("{what} is {}", shown(value)), "must be greater than 0", ""))
-    }
-}
-
-/// Refuse a number that stands for a count and is zero.
-///
-/// # Errors
-/// The flaw of the key.
-pub fn at_least_one(key: &str, count: usize) -> Result<(), Flaw> {
-    if count > 0 { Ok(()) } else { Err(Flaw::new(key, format!("`{key}` is 0"), "must be 1 or more", "")) }
-}
-
-/// Refuse a table that has several keys of which one can hold. The caret marks the later one; an option comes later
-/// than the scene file.
+/// Refuse a table that has several keys of which one can hold. The caret marks the later one; options come later than
+/// the scene file.
 ///
 /// # Errors
 /// The two keys.
@@ -240,37 +68,57 @@ pub fn place<T>(value: &Option<Located<T>>) -> Option<&Place> {
     value.as_ref().map(|value| &value.place)
 }
 
-/// Read a table and check it, for `#[serde(deserialize_with)]`.
-///
-/// # Errors
-/// Those of serde, and the flaws of the table.
-pub fn checked<'de, T: Deserialize<'de> + Check, D: Deserializer<'de>>(deserializer: D) -> Result<T, D::Error> {
-    let table = Spanned::<T>::deserialize(deserializer)?;
-    match table.get_ref().check(geometry()) {
-        Ok(()) => Ok(table.into_inner()),
-        Err(flaw) => Err(keep(flaw, Some(table.span()))),
+/// A table and its place. serde would also take a list, whose items it would give to the keys in their order.
+pub struct Table<T>(pub Located<T>);
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Table<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let Located { value, place } = Located::<Form<IgnoredAny, T>>::deserialize(deserializer)?;
+        match value {
+            Form::Table(table) => Ok(Self(Located::new(table, place))),
+            other => Err(other.instead_of("a table", &place)),
+        }
     }
 }
 
-/// Read a list of tables and check each.
+/// Read a table, for `#[serde(deserialize_with)]`.
 ///
 /// # Errors
-/// Those of [`checked`].
-pub fn all<'de, T: Deserialize<'de> + Check, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<T>, D::Error> {
-    struct Item<T>(T);
+/// Those of serde.
+pub fn table<'de, T: Deserialize<'de>, D: Deserializer<'de>>(deserializer: D) -> Result<T, D::Error> {
+    Table::deserialize(deserializer).map(|table| table.0.value)
+}
 
-    impl<'de, T: Deserialize<'de> + Check> Deserialize<'de> for Item<T> {
-        fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-            checked(deserializer).map(Self)
-        }
-    }
-    Ok(Vec::<Item<T>>::deserialize(deserializer)?.into_iter().map(|item| item.0).collect())
+/// Read a table of a key that need not be there.
+///
+/// # Errors
+/// Those of serde.
+pub fn some_table<'de, T: Deserialize<'de>, D: Deserializer<'de>>(deserializer: D) -> Result<Option<T>, D::Error> {
+    table(deserializer).map(Some)
+}
+
+/// Read a table and its place.
+///
+/// # Errors
+/// Those of serde.
+pub fn located<'de, T: Deserialize<'de>, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<Option<Located<T>>, D::Error> {
+    Table::deserialize(deserializer).map(|table| Some(table.0))
+}
+
+/// Read a list of tables.
+///
+/// # Errors
+/// Those of serde.
+pub fn tables<'de, T: Deserialize<'de>, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<T>, D::Error> {
+    Ok(Vec::<Table<T>>::deserialize(deserializer)?.into_iter().map(|table| table.0.value).collect())
 }
 
 impl<'de, T: Deserialize<'de>> Deserialize<'de> for Located<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let value = Spanned::<T>::deserialize(deserializer)?;
-        let place = place_of(value.span());
+        let place = unplaced(value.span());
         Ok(Self::new(value.into_inner(), place))
     }
 }
@@ -295,31 +143,6 @@ impl<T: JsonSchema> JsonSchema for Located<T> {
     }
 }
 
-/// Return the path of a file that is there, joined with the folder of the scene.
-///
-/// # Errors
-/// A file that is not there, with the name of one that is; a folder.
-pub fn file(name: Located<String>) -> Checked<Located<PathBuf>> {
-    let path = CONTEXT.with_borrow(|context| context.folder.join(&name.value));
-    match std::fs::metadata(&path) {
-        Ok(found) if found.is_file() => Ok(Located::new(path, name.place)),
-        Ok(_) => Err(Error::scene(&name.place, format!("{} is not a file", path.display()))),
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-            let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-            let files = std::fs::read_dir(folder).into_iter().flatten().flatten();
-            let names: Vec<_> = files.map(|file| file.file_name().to_string_lossy().into_owned()).collect();
-            let wanted = path.file_name().unwrap_or_default().to_string_lossy();
-            let error = Error::scene(&name.place, format!("there is no file {}", path.display())).label("not there");
-            Err(error.suggest(&wanted, names.iter().map(String::as_str), || {
-                "paths are relative to the folder of the scene file".to_owned()
-            }))
-        }
-        Err(error) => {
-            Err(Error::scene(&name.place, format!("cannot look at {}", path.display())).because(error.to_string()))
-        }
-    }
-}
-
 /// A value of one of several forms. `L` is the type of the items of a list, and `T` that of a table; [`IgnoredAny`]
 /// where they have no meaning.
 pub enum Form<L = IgnoredAny, T = IgnoredAny> {
@@ -332,23 +155,23 @@ pub enum Form<L = IgnoredAny, T = IgnoredAny> {
 }
 
 impl<L, T> Form<L, T> {
-    /// Return the refusal of a form that has no meaning. The schema says which ones have.
-    pub fn unexpected<E: de::Error>(&self) -> E {
-        E::invalid_type(Unexpected::Other("another form"), &"a form of the schema")
-    }
-
-    /// Return the refusal of a form where a number or an expression belongs. It has a place, which serde does not know
-    /// for items of lists.
-    fn instead_of_field(&self, place: &Place) -> Error {
+    /// Return the refusal of a form that has no meaning; `expected` says in words what has.
+    pub fn instead_of<E: de::Error>(&self, expected: &str, place: &Place) -> E {
         let found = match self {
             Self::Flag => "true or false",
+            Self::Integer(_) => "a whole number",
+            Self::Number(_) => "a number",
+            Self::Text(_) => "a string",
             Self::List(_) => "a list",
-            _ => "a table",
+            Self::Table(_) => "a table",
         };
-        let error = Error::scene(place, format!("expected a number or an expression, found {found}"));
-        error.label("not a number or an expression")
+        let error = Error::scene(place, format!("expected {expected}, found {found}"));
+        refused(error.label(format!("not {expected}")))
     }
 }
+
+/// What belongs where a [`Field`] stands.
+const FIELD: &str = "a number or an expression";
 
 impl<'de, L: Deserialize<'de>, T: Deserialize<'de>> Deserialize<'de> for Form<L, T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
@@ -398,93 +221,58 @@ impl<'de, L: Deserialize<'de>, T: Deserialize<'de>> Deserialize<'de> for Form<L,
 /// an energy, where the least normal double is 2e-308.
 const LEAST: f64 = 1e-110;
 
-/// A number or an expression. The data of the scene are known when it is read.
+/// A number or an expression.
 impl<'de> Deserialize<'de> for Field {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let Located { value, place } = Located::<Form>::deserialize(deserializer)?;
-        field(value, &place)
+        field(value, place)
     }
 }
 
-/// Read something whose expressions may have the factors of the load steps, and with `coordinates` these, too.
-fn stepped<T>(coordinates: bool, read: impl FnOnce() -> T) -> T {
-    let set = |names| CONTEXT.with_borrow_mut(|context| std::mem::replace(&mut context.names, names));
-    let before = set(Names { coordinates, factors: true });
-    let result = read();
-    set(before);
-    result
-}
-
-/// Read a number or an expression in the coordinates and the factors of the load steps, for
-/// `#[serde(deserialize_with)]`.
+/// Refuse forces and moments that depend on the place.
 ///
 /// # Errors
-/// Those of serde, and texts that are no expression.
-pub fn of_steps<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Field, D::Error> {
-    stepped(true, || Field::deserialize(deserializer))
-}
-
-/// Read something whose expressions have the factors of the load steps alone, for `#[serde(deserialize_with)]`.
-///
-/// # Errors
-/// Those of serde, and texts that are no expression.
-pub fn by_factors<'de, T: Deserialize<'de>, D: Deserializer<'de>>(deserializer: D) -> Result<T, D::Error> {
-    stepped(false, || T::deserialize(deserializer))
+/// An expression in the coordinates.
+pub fn check_numbers(fields: &[Field]) -> Checked<()> {
+    let Some(place) = fields.iter().find_map(Field::place) else { return Ok(()) };
+    let error = Error::scene(place, "a total force or moment does not depend on the place");
+    Err(error.help("give numbers, or a traction with expressions"))
 }
 
 /// Return the field of a value that is no list and no table.
-fn field<E: de::Error, L, T>(value: Form<L, T>, place: &Place) -> Result<Field, E> {
-    let field = match value {
-        Form::Integer(value) => Field::Constant(value as f64),
-        Form::Number(value) => Field::Constant(value),
-        Form::Text(text) => condition(&text, place, false).map_err(kept)?,
-        other => return Err(kept(other.instead_of_field(place))),
+fn field<E: de::Error, L, T>(value: Form<L, T>, place: Place) -> Result<Field, E> {
+    let number = match value {
+        Form::Integer(value) => value as f64,
+        Form::Number(value) => value,
+        Form::Text(text) => return Ok(Field::Expression(Expression::uncompiled(&text, place))),
+        other => return Err(other.instead_of(FIELD, &place)),
     };
-    let number = if let Field::Constant(value) = field { value } else { 0.0 };
+    check_number(number, &place).map_err(refused)?;
+    Ok(Field::Constant(number))
+}
+
+/// Refuse numbers with which no run computes.
+fn check_number(number: f64, place: &Place) -> Checked<()> {
     let refuse = |message: String| Error::scene(place, message);
     if !number.is_finite() {
-        return Err(kept(refuse("the number is not finite".to_owned())));
+        return Err(refuse("the number is not finite".to_owned()));
     }
     if number != 0.0 && !(LEAST..=LEAST.recip()).contains(&number.abs()) {
-        return Err(kept(
-            refuse(format!("no run computes with a number like {number:e}"))
-                .label("must be 0, or of a size from 1e-110 to 1e110")
-                .help("choose other units of length and force"),
-        ));
+        return Err(refuse(format!("no run computes with a number like {number:e}"))
+            .label("must be 0, or of a size from 1e-110 to 1e110")
+            .help("choose other units of length and force"));
     }
-    Ok(field)
+    Ok(())
 }
 
-/// Compile an expression in the coordinates, and with `iteration` in the iteration k, too; or in what else the key that
-/// is read may have.
-///
-/// # Errors
-/// A text that is no expression.
-pub fn condition(text: &str, place: &Place, iteration: bool) -> Checked<Field> {
-    CONTEXT.with_borrow(|Context { geometry, data, factors, names, .. }| {
-        let variables = if names.coordinates { coordinates(geometry.dimension, iteration) } else { Vec::new() };
-        let factors = if names.factors { &factors[..] } else { &[] };
-        Field::parse(text, place, KnownNames { variables: &variables, factors, data })
-    })
-}
-
-/// Compile an expression in the iteration k alone.
-///
-/// # Errors
-/// A text that is no expression.
-pub fn of_iteration(text: &str, place: &Place) -> Checked<Field> {
-    Field::parse(text, place, KnownNames { variables: &["k"], factors: &[], data: &data() })
-}
-
-/// Compile an expression in the coordinates, behind `first`.
-///
-/// # Errors
-/// A text that is no expression.
-pub fn expression(text: &str, place: &Place, first: &[&'static str]) -> Checked<Expression> {
-    CONTEXT.with_borrow(|Context { geometry, data, .. }| {
-        let variables = [first, &["x", "y", "z"][..geometry.dimension]].concat();
-        Expression::parse(text, place, KnownNames { variables: &variables, factors: &[], data })
-    })
+impl Compile for Field {
+    fn compile(&mut self, names: &Names<'_>) -> Checked<()> {
+        let Self::Expression(expression) = self else { return Ok(()) };
+        let mut place = expression.place().clone();
+        place.compile(names)?;
+        *self = Self::parse(expression.text(), &place, names.known())?;
+        if let Self::Constant(number) = self { check_number(*number, &place) } else { Ok(()) }
+    }
 }
 
 impl Serialize for Field {
@@ -506,47 +294,37 @@ impl JsonSchema for Field {
     }
 }
 
-/// A vector with one component for each dimension; in the plane the third one is zero.
-#[derive(Debug, Clone, JsonSchema)]
+/// A vector: three components, of which the third is zero in the plane. One that was made in Rust is also written with
+/// three.
+#[derive(Debug, Clone, PartialEq, JsonSchema)]
 #[schemars(with = "Vec<Field>")]
-pub struct Vector(pub [Field; 3]);
-
-impl Vector {
-    /// Return the vector with these components. There must be `count` of them.
-    fn of(components: Located<Vec<Located<Field>>>, count: usize) -> Checked<Self> {
-        let Located { value: items, place } = components;
-        if items.len() != count {
-            let place = items.get(count).map_or(&place, |extra| &extra.place);
-            return Err(Error::scene(place, format!("a vector has {count} components here, not {}", items.len()))
-                .help(format!("the dimension of the scene is {count}")));
-        }
-        let mut items = items.into_iter().map(|item| item.value);
-        Ok(Self(std::array::from_fn(|_| items.next().unwrap_or(Field::Constant(0.0)))))
-    }
-
-    /// Return the numbers of a vector that does not depend on the place.
-    ///
-    /// # Errors
-    /// An expression in the coordinates.
-    pub fn numbers(&self) -> Checked<[f64; 3]> {
-        let mut numbers = [0.0; 3];
-        for (number, field) in numbers.iter_mut().zip(&self.0) {
-            *number = constant(field)?;
-        }
-        Ok(numbers)
-    }
+pub struct Vector {
+    components: Box<[Field; 3]>,
+    /// Number of components in the scene file.
+    given: Option<usize>,
 }
 
-/// Return a number that does not depend on the place.
-///
-/// # Errors
-/// An expression in the coordinates.
-fn constant(field: &Field) -> Checked<f64> {
-    match field {
-        Field::Constant(value) => Ok(*value),
-        field => Err(Error::new(Kind::Scene, "a total force or moment does not depend on the place")
-            .help("give numbers, or a traction with expressions")
-            .at(field.place().unwrap_or(&Place::default()))),
+impl Vector {
+    /// Return whether three components are given.
+    pub fn is_in_space(&self) -> bool {
+        self.given == Some(3)
+    }
+
+    /// Refuse another number of components than the dimension has.
+    ///
+    /// # Errors
+    /// A fault of the key, or of its first component too many.
+    pub fn check(&self, key: &str, geometry: Geometry) -> Result<(), Fault> {
+        let count = geometry.dimension;
+        let Some(given) = self.given.filter(|given| *given != count) else { return Ok(()) };
+        let key = if given > count { format!("{key}.{count}") } else { key.to_owned() };
+        let message = format!("a vector has {count} components here, not {given}");
+        Err(Fault::new(key, message, "", &format!("the dimension of the scene is {count}")))
+    }
+
+    /// Return the numbers of a vector that does not depend on the place; NaN where it does.
+    pub fn numbers(&self) -> [f64; 3] {
+        self.components.each_ref().map(Field::number)
     }
 }
 
@@ -554,64 +332,127 @@ impl Deref for Vector {
     type Target = [Field; 3];
 
     fn deref(&self) -> &[Field; 3] {
-        &self.0
+        &self.components
     }
 }
 
-impl From<[Field; 3]> for Vector {
-    fn from(components: [Field; 3]) -> Self {
-        Self(components)
+/// The components that are missing are zero.
+impl<T: Into<Field>, const N: usize> From<[T; N]> for Vector {
+    fn from(components: [T; N]) -> Self {
+        const { assert!(N <= 3, "vectors have three components at most") };
+        Self { given: None, ..components.map(Into::into).to_vec().into() }
     }
 }
 
-impl From<[f64; 3]> for Vector {
-    fn from(numbers: [f64; 3]) -> Self {
-        Self(numbers.map(Field::Constant))
+impl From<Vec<Field>> for Vector {
+    fn from(components: Vec<Field>) -> Self {
+        let (given, mut components) = (Some(components.len()), components.into_iter());
+        let fields = std::array::from_fn(|_| components.next().unwrap_or(Field::Constant(0.0)));
+        Self { components: Box::new(fields), given }
     }
 }
 
 impl<'de> Deserialize<'de> for Vector {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        Self::of(Located::deserialize(deserializer)?, geometry().dimension).map_err(kept)
+        Vec::<Field>::deserialize(deserializer).map(Self::from)
     }
 }
 
 impl Serialize for Vector {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        self.0[..geometry().dimension].serialize(serializer)
+        self[..self.given.unwrap_or(3).min(3)].serialize(serializer)
     }
 }
 
-/// A number or an expression, or one for each component.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
+impl Compile for Vector {
+    fn compile(&mut self, names: &Names<'_>) -> Checked<()> {
+        self.components.compile(names)
+    }
+}
+
+/// A number or an expression, or one for each component. A rotation or a moment is a number about z in the plane, and a
+/// vector in space.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum OneOrVector {
+    /// One for all components.
     One(Field),
+    /// One for each.
     Vector(Vector),
 }
 
-impl<'de> Deserialize<'de> for OneOrVector {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let Located { value, place } = Located::<Form<Located<Field>>>::deserialize(deserializer)?;
-        match value {
-            Form::List(items) => {
-                Vector::of(Located::new(items, place), geometry().dimension).map(Self::Vector).map_err(kept)
+impl OneOrVector {
+    /// Return its numbers or expressions.
+    pub fn fields(&self) -> &[Field] {
+        match self {
+            Self::One(field) => std::slice::from_ref(field),
+            Self::Vector(vector) => &vector[..],
+        }
+    }
+
+    /// Return its numbers or expressions.
+    pub fn fields_mut(&mut self) -> &mut [Field] {
+        match self {
+            Self::One(field) => std::slice::from_mut(field),
+            Self::Vector(vector) => &mut vector.components[..],
+        }
+    }
+
+    /// Return the components (x, y, z) of a rotation or a moment, from the values of its numbers or expressions.
+    pub fn axial(&self, value: impl Fn(&Field) -> f64) -> [f64; 3] {
+        match self {
+            Self::One(about_z) => [0.0, 0.0, value(about_z)],
+            Self::Vector(vector) => vector.each_ref().map(value),
+        }
+    }
+
+    /// Refuse a rotation or a moment that is a vector in the plane or a number in space.
+    ///
+    /// # Errors
+    /// A fault of the key.
+    pub fn check_axial(&self, key: &str, geometry: Geometry) -> Result<(), Fault> {
+        match (self, geometry.is_plane()) {
+            (Self::One(_), false) => Err(Fault::new(key, "a moment is a vector in space", "", "moment = [MX, MY, MZ]")),
+            (Self::Vector(Vector { given: Some(_), .. }), true) => {
+                Err(Fault::new(key, "a moment is a number in the plane", "", "moment = M, about z"))
             }
-            value => field(value, &place).map(Self::One),
+            (Self::Vector(vector), false) => vector.check(key, geometry),
+            _ => Ok(()),
         }
     }
 }
 
-/// A direction in space. In the plane the third component may be left out.
-#[derive(JsonSchema)]
-#[schemars(with = "Vec<Field>")]
-pub struct Direction(pub [Field; 3]);
+impl From<[f64; 3]> for OneOrVector {
+    fn from(numbers: [f64; 3]) -> Self {
+        Self::Vector(numbers.into())
+    }
+}
 
-impl<'de> Deserialize<'de> for Direction {
+/// A single field stands for all components.
+impl Index<usize> for OneOrVector {
+    type Output = Field;
+
+    fn index(&self, component: usize) -> &Field {
+        match self {
+            Self::One(field) => field,
+            Self::Vector(vector) => &vector[component],
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for OneOrVector {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let components = Located::<Vec<_>>::deserialize(deserializer)?;
-        let count = if components.len() == 3 { 3 } else { geometry().dimension };
-        Vector::of(components, count).map(|vector| Self(vector.0)).map_err(kept)
+        let Located { value, place } = Located::<Form<Field>>::deserialize(deserializer)?;
+        match value {
+            Form::List(fields) => Ok(Self::Vector(fields.into())),
+            value => field(value, place).map(Self::One),
+        }
+    }
+}
+
+impl Compile for OneOrVector {
+    fn compile(&mut self, names: &Names<'_>) -> Checked<()> {
+        self.fields_mut().compile(names)
     }
 }
 
@@ -623,9 +464,18 @@ impl<'de> Deserialize<'de> for Expression {
             Form::Integer(value) => value.to_string(),
             Form::Number(value) => value.to_string(),
             Form::Text(text) => text,
-            other => return Err(kept(other.instead_of_field(&place))),
+            other => return Err(other.instead_of(FIELD, &place)),
         };
-        expression(&text, &place, &[]).map_err(kept)
+        Ok(Self::uncompiled(&text, place))
+    }
+}
+
+impl Compile for Expression {
+    fn compile(&mut self, names: &Names<'_>) -> Checked<()> {
+        let mut place = self.place().clone();
+        place.compile(names)?;
+        *self = Self::parse(self.text(), &place, names.known())?;
+        Ok(())
     }
 }
 

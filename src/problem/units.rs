@@ -1,6 +1,6 @@
 //! Names of the units of a scene, which are words for labels. Nothing is converted.
 
-use super::read::kept;
+use super::read::refused;
 use crate::error::{Error, Located};
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -47,7 +47,7 @@ impl From<Units> for String {
 impl<'de> Deserialize<'de> for Units {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let text = Located::<String>::deserialize(deserializer)?;
-        let refuse = |message: &str| kept(Error::scene(&text.place, message).help("for example \"mm, MPa\""));
+        let refuse = |message: &str| refused(Error::scene(&text.place, message).help("for example \"mm, MPa\""));
         let [length, stress] = text.split(',').map(str::trim).collect::<Vec<_>>()[..] else {
             return Err(refuse("expected a length and a stress, with a comma between"));
         };

@@ -1,8 +1,6 @@
 //! Keys and values of scenes, commands and options that earlier versions or other programs know, each with what to use
 //! instead.
 
-use crate::error::Error;
-
 /// Names that are gone, or stand for what is not computed: a key or a word that was the value of a key: the name, what
 /// its place in the scene is called, and the advice.
 const KEYS: &[(&str, &str, &str)] = &[
@@ -72,19 +70,10 @@ const SWEEPS: &str = "name = \"auto\", or \"robin\" with gamma = \"aitken\"";
 const HEIGHTS: &str =
     "data are a grid without gaps: scripts/library/heights.py makes one, with gaps filled and a form subtracted";
 
-/// Replace the advice of a refusal of an unknown key or value if its name is gone.
-pub fn explain(error: Error) -> Error {
-    let words: Vec<&str> = error.message().split('`').collect();
-    let name = match words[..] {
-        ["unknown key " | "unknown word ", name, ..] => name,
-        [start, .., name, ""] if start.starts_with("unknown ") => name,
-        _ => return error,
-    };
-    let is_meant = |(known, place, _): &&(&str, &str, &str)| *known == name && error.message().contains(place);
-    match KEYS.iter().find(is_meant) {
-        Some((.., advice)) => error.help(*advice),
-        None => error,
-    }
+/// Return the advice for a key of a table, or a value of a key, that is gone. `place` is what the table or the key is
+/// called in messages.
+pub fn advice_in(name: &str, place: &str) -> Option<&'static str> {
+    KEYS.iter().find(|(known, of, _)| *known == name && place.contains(of)).map(|(.., advice)| *advice)
 }
 
 /// Return the advice for a name of a list, if it is gone.

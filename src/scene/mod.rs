@@ -1,120 +1,100 @@
 //! Scene files: from TOML to a checked [`Scene`]. Every refusal names file and line, and says what to do.
 //!
-//! [`load`] parses the file into a table with spans, puts the options of the command line into it (`overrides`), and
-//! lets serde read the [`Scene`] from it. What serde refuses is put into words by `refuse`. The scene, whether it is
-//! read or built in Rust, is checked by [`Scene::verify`].
+//! [`load`] parses the file into a `document` and changes it by the options of the command line. The scene is made in two
+//! passes: serde reads it, and [`Compile`] completes it with what is known of the whole scene. What serde refuses is put
+//! into words by `refuse`. The scene, whether it is read or built in Rust, is checked by [`Scene::verify`].
 
+mod document;
 pub mod gone;
-mod overrides;
 mod refuse;
 mod spec;
 #[cfg(test)]
 mod tests;
 
-pub use spec::{AdaptSpec, Most, OutputSpec, Precision, Quantity, Scene, remove, schema};
+pub use spec::{AdaptSpec, Flags, OutputSpec, Precision, Quantity, Scene, remove, schema};
 
 use crate::error::{Error, Kind, Located, Result, Source};
-use crate::problem::data::{DataKeys, library};
-use crate::problem::geometry::{Geometry, Plane};
-use crate::problem::history::History;
-use crate::problem::method;
-use crate::problem::read::{Context, Sources, within};
-use overrides::Typed;
-use refuse::Reader;
-use serde::Deserialize;
-use std::collections::BTreeMap;
+use crate::expression::coordinates;
+use crate::problem::compile::{Compile, Names};
+use crate::problem::data::find_files;
+use document::Document;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use toml::Spanned;
-use toml::de::{DeTable, DeValue};
 
-/// Read and check a scene file, after applying `overrides` in their order: `KEY=VALUE` as given to `--set`, or options
-/// that are short for it. The mesh file must exist; it is not read.
+/// Read and check a scene file, after applying `overrides` in their order: `KEY=VALUE` as given to `--set`. The mesh
+/// file must exist; it is not read.
 ///
 /// # Errors
 /// Refusals point at the text of the scene or of the override. A file that cannot be read is [`Kind::File`].
 pub fn load(path: &Path, overrides: &[String]) -> Result<Scene> {
-    parse(path, text(path)?, overrides)
+    parse(path, text(path)?, overrides, &Flags::default())
 }
 
-/// Check the [`text`] of a scene file like [`load`], which reads it from `path`.
+/// Check the [`text`] of a scene file like [`load`], which reads it from `path`. Overrides of another option than
+/// `--set` begin with it: `--over KEY=VALUE`. Flags come last.
 ///
 /// # Errors
 /// Those of [`load`], but for reading the file.
-pub fn parse(path: &Path, text: String, overrides: &[String]) -> Result<Scene> {
-    let source = Arc::new(Source { name: path.display().to_string(), text });
-    let mut sources = Sources::default();
-    sources.add(source.clone());
-    let options: Vec<Typed> = overrides.iter().map(|text| Typed::new(text, &mut sources)).collect();
-    let mut table = DeTable::parse(&source.text).map_err(|error| refuse::syntax(&source, 0, &error))?;
-    options.iter().try_for_each(|option| option.apply(table.get_mut()))?;
-    if let Some(method) = table.get_mut().get_mut("method") {
-        method::complete(method);
-        refuse_idle(method, &sources, source.text.len())?;
-    }
-    let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-    let reader = Reader { table, sources };
-    reader.refuse_lists()?;
-    let mut scene = read(&reader, Context { sources: reader.sources.clone(), folder, ..Context::default() })
-        .map_err(gone::explain)?;
+pub fn parse(path: &Path, text: String, overrides: &[String], flags: &Flags) -> Result<Scene> {
+    let file = Arc::new(Source { name: path.display().to_string(), text });
+    let options: Vec<Arc<Source>> = overrides.iter().map(|text| option(text)).collect();
+    let document = Document::new(&file, &options)?;
+    let mut scene: Scene = document.read()?;
     scene.path = path.to_owned();
     if scene.title.is_empty() {
         scene.title = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     }
-    for (table, contact) in scene.contacts.iter_mut().enumerate() {
-        contact.table = table;
-        contact.complete();
-    }
+    scene.compile(&document, path.parent().unwrap_or(Path::new("")))?;
+    let of_flags = flags.apply(&mut scene, &|path| document.find(path));
+    let find = |path: &str| of_flags.get(path).cloned().or_else(|| document.find(path));
+    scene.method.complete(|key| find(&format!("method.{key}")))?;
     scene.method.steps.join(&scene.bodies, &scene.contacts)?;
-    scene.verify()?;
+    scene.verify(&find)?;
     Ok(scene)
 }
 
-/// Refuse a key of `[method]` that the method does not read. `length` is that of the file, after which the options
-/// begin.
-fn refuse_idle(method: &Spanned<DeValue<'_>>, sources: &Sources, length: usize) -> Result<()> {
-    let Some(idle) = method::idle_key(method, |span| span.start > length) else { return Ok(()) };
-    let message = format!("the method `{}` does not read `{}`", idle.method, idle.name);
-    Err(Error::scene(&sources.place(idle.span), message)
-        .label("no effect")
-        .help(format!("leave it out, or choose a method that reads it: {}", idle.readers)))
+/// Return an option of the command line as a text with a name.
+fn option(text: &str) -> Arc<Source> {
+    let text = text.trim_end();
+    let text = if text.starts_with("--") { text.to_owned() } else { format!("--set {text}") };
+    let name = text.split(' ').next().unwrap_or_default().to_owned();
+    Arc::new(Source { name, text })
 }
 
-/// What must be known before the rest of a scene is read.
-#[derive(Deserialize)]
-struct Head {
-    dimension: Located<usize>,
-    plane: Option<Located<Plane>>,
-    #[serde(default)]
-    data: BTreeMap<Spanned<String>, DataKeys>,
-    #[serde(default)]
-    method: Stepped,
-}
-
-/// The load steps.
-#[derive(Default, Deserialize)]
-struct Stepped {
-    #[serde(default)]
-    steps: History,
-}
-
-/// Read a scene: first what expressions and vectors depend on, then all.
-fn read(reader: &Reader<'_>, context: Context) -> Result<Scene> {
-    let (geometry, data, factors) = within(context.clone(), || {
-        let Head { dimension, plane, data, method } = reader.read()?;
-        if ![2, 3].contains(&dimension.value) {
-            let message = format!("`dimension` is {}", dimension.value);
-            return Err(Error::scene(&dimension.place, message).label("must be 2 or 3"));
+impl Scene {
+    /// Complete a scene that serde has read. What others refer to comes first: the dimension, data, load steps.
+    fn compile(&mut self, document: &Document<'_>, folder: &Path) -> Result<()> {
+        let Located { value: dimension, place } = &mut self.dimension;
+        let mut names = Names {
+            sources: &document.sources,
+            folder,
+            dimension: *dimension,
+            data: &Default::default(),
+            variables: &[],
+            factors: &[],
+            of_steps: &[],
+        };
+        place.compile(&names)?;
+        if ![2, 3].contains(dimension) {
+            return Err(Error::scene(place, format!("`dimension` is {dimension}")).label("must be 2 or 3"));
         }
-        if let (3, Some(plane)) = (dimension.value, &plane) {
-            return Err(Error::scene(&plane.place, "`plane` in a problem in space")
+        if let (3, Some(place)) = (*dimension, document.find("plane")) {
+            return Err(Error::scene(&place, "`plane` in a problem in space")
                 .label("only plane problems have it")
                 .help("remove it, or set dimension = 2"));
         }
-        let plane = plane.map_or(Plane::Strain, |plane| plane.value);
-        Ok((Geometry { dimension: dimension.value, plane }, library(data)?, method.steps.factor_names()))
-    })?;
-    within(Context { geometry, data, factors, ..context }, || reader.read())
+        find_files(&mut self.data, &names)?;
+        self.method.steps.compile(&names)?;
+        let (variables, of_steps) = (coordinates(*dimension, false), self.method.steps.factor_names());
+        names = Names { data: &self.data, variables: &variables, of_steps: &of_steps, ..names };
+        self.mesh.compile(&names)?;
+        self.bodies.compile(&names)?;
+        self.contacts.compile(&names)?;
+        self.method.compile(&names)?;
+        self.adapt.compile(&names)?;
+        self.contacts.iter_mut().enumerate().for_each(|(table, contact)| contact.table = table);
+        Ok(())
+    }
 }
 
 /// Return the folder of examples, if the source that the program was built from is still there.

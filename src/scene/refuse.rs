@@ -1,15 +1,18 @@
 //! What the toml crate and serde refuse, put into words for a user: the place, what is wrong there, and what to do
 //! about it. Descriptions of keys are those of the JSON schema.
 
+use super::gone;
 use super::spec::schema;
-use crate::error::{Error, Result, Source, nearest};
-use crate::problem::read::{Sources, refusal};
-use serde::Deserialize;
+use crate::error::{Error, Source, nearest};
+use crate::problem::compile::Sources;
 use serde_json::Value as Json;
 use std::ops::Range;
 use std::sync::Arc;
 use toml::Spanned;
-use toml::de::{DeTable, DeValue, Deserializer};
+use toml::de::DeValue;
+
+/// A value of a document.
+pub type Node<'i> = Spanned<DeValue<'i>>;
 
 /// Turn an error of the `toml` crate into a refusal, with advice for common slips. Its spans begin at byte `offset` of
 /// the source.
@@ -36,92 +39,59 @@ pub fn syntax(source: &Arc<Source>, offset: usize, error: &toml::de::Error) -> E
     }
 }
 
-/// The table of a scene, which may be read several times.
-pub struct Reader<'i> {
-    /// The table.
-    pub table: Spanned<DeTable<'i>>,
-    /// The texts that its spans point into.
-    pub sources: Sources,
-}
-
-impl<'i> Reader<'i> {
-    /// Read the table.
-    ///
-    /// # Errors
-    /// The first refusal.
-    pub fn read<T: Deserialize<'i>>(&self) -> Result<T> {
-        T::deserialize(Deserializer::from(self.table.clone())).map_err(|error| self.refuse(&error))
+/// Return the refusal of an error of serde for the document `root`.
+pub fn refuse(root: &Node<'_>, sources: &Sources, error: &toml::de::Error) -> Error {
+    let span = error.span().unwrap_or(0..0);
+    if let Some((error, own)) = Error::unpacked(error.message()) {
+        let span = own.unwrap_or(span);
+        let about = Found::of(root, &span, false).map_or(String::new(), |found| about(&found.path));
+        let is_explained = error.advice().is_some() || about.is_empty() || !error.message().starts_with("expected ");
+        let error = error.at(&sources.place(span));
+        return if is_explained { error } else { error.help(about) };
     }
-
-    /// Refuse lists where tables belong.
-    ///
-    /// # Errors
-    /// The first such list.
-    pub fn refuse_lists(&self) -> Result<()> {
-        let tree = self.tree();
-        let Some(span) = list_for_table(&tree, &forms(&schema())) else { return Ok(()) };
-        let found = Found::of(&tree, &span, false).unwrap_or(Found::root(&tree));
-        Err(wrong_value(|message| Error::scene(&self.sources.place(span.clone()), message), &found, ""))
-    }
-
-    fn tree(&self) -> Spanned<DeValue<'i>> {
-        Spanned::new(self.table.span(), DeValue::Table(self.table.get_ref().clone()))
-    }
-
-    /// Return the refusal of an error of serde.
-    fn refuse(&self, error: &toml::de::Error) -> Error {
-        let tree = self.tree();
-        let key_in = |table: &Range<usize>, key: &str| {
-            let mut node = Found::of(&tree, table, true)?.node;
-            for part in key.split('.') {
-                node = match part.parse::<usize>() {
-                    Ok(index) if node.get_ref().is_array() => node.get_ref().get(index)?,
-                    _ => node.get_ref().get(part)?,
-                };
-            }
-            Some(node.span())
-        };
-        if let Some(error) = refusal(&self.sources, error.span(), key_in) {
-            return error;
+    let refusal = |message: String| Error::scene(&sources.place(span.clone()), message);
+    let message = error.message();
+    let found = Found::of(root, &span, message.starts_with("missing")).unwrap_or(Found::root(root));
+    let words: Vec<&str> = message.split('`').collect();
+    let known = || words.iter().skip(3).step_by(2).copied();
+    match words[..] {
+        ["unknown field ", name, ..] => unknown_key(refusal, name, &found, known().collect()),
+        ["missing field ", name, ..] => {
+            let about = about(&[&found.path[..], &[name.to_owned()]].concat());
+            refusal(format!("{} has no `{name}`", title(&found.path)))
+                .label(format!("`{name}` is missing"))
+                .help(format!("{name}: {about}"))
         }
-        let span = error.span().unwrap_or(0..0);
-        let refusal = |message: String| Error::scene(&self.sources.place(span.clone()), message);
-        let message = error.message();
-        let found = Found::of(&tree, &span, message.starts_with("missing")).unwrap_or(Found::root(&tree));
-        let words: Vec<&str> = message.split('`').collect();
-        let known = || words.iter().skip(3).step_by(2).copied();
-        match words[..] {
-            ["unknown field ", name, ..] => unknown_key(refusal, name, &found, known().collect()),
-            ["missing field ", name, ..] => {
-                let schema = schema();
-                let about = description(&at(&schema, found.path.iter().map(String::as_str).chain([name])));
-                refusal(format!("{} has no `{name}`", title(&found.path)))
-                    .label(format!("`{name}` is missing"))
-                    .help(format!("{name}: {about}"))
+        ["unknown variant ", word, ..] => {
+            let key = found.path.join(".");
+            let error = refusal(format!("unknown word `{word}` for `{key}`"));
+            match gone::advice_in(word, &key) {
+                Some(advice) => error.help(advice),
+                None => {
+                    error.suggest(word, known(), || format!("it is one of {}", known().collect::<Vec<_>>().join(", ")))
+                }
             }
-            ["unknown variant ", word, ..] => refusal(format!("unknown word `{word}` for `{}`", found.path.join(".")))
-                .suggest(word, known(), || format!("it is one of {}", known().collect::<Vec<_>>().join(", "))),
-            _ => wrong_value(refusal, &found, message),
         }
+        _ => wrong_value(refusal, &found, message),
     }
 }
 
 /// A value of a scene that was found by its span.
 struct Found<'t, 'i> {
     /// The value.
-    node: &'t Spanned<DeValue<'i>>,
+    node: &'t Node<'i>,
     /// The keys that lead to it. Numbers stand for items of lists.
     path: Vec<String>,
 }
 
 impl<'t, 'i> Found<'t, 'i> {
-    fn root(node: &'t Spanned<DeValue<'i>>) -> Self {
+    fn root(node: &'t Node<'i>) -> Self {
         Self { node, path: Vec::new() }
     }
 
     /// Find the value that has a span, or whose key has it. A list that is written `[[body]]` has the span of an item;
     /// `innermost` asks for the item.
-    fn of(node: &'t Spanned<DeValue<'i>>, span: &Range<usize>, innermost: bool) -> Option<Self> {
+    fn of(node: &'t Node<'i>, span: &Range<usize>, innermost: bool) -> Option<Self> {
         let own = || (node.span() == *span).then(|| Self::root(node));
         let below = || match node.get_ref() {
             DeValue::Table(table) => table.iter().find_map(|(key, value)| {
@@ -154,22 +124,22 @@ const TOP_LEVEL: [&str; 8] = ["title", "dimension", "plane", "units", "mesh", "s
 /// Return the refusal of a key that the table does not have, with the key that was probably meant.
 fn unknown_key(refusal: impl Fn(String) -> Error, name: &str, found: &Found<'_, '_>, known: Vec<&str>) -> Error {
     let table = &found.path[..found.path.len().saturating_sub(1)];
+    let title = title(table);
     let synonym = SYNONYMS.iter().find(|(other, own)| *other == name && known.contains(own));
-    let help = match synonym.map(|(_, own)| *own).or_else(|| nearest(name, known.iter().copied())) {
-        Some(near) => format!("did you mean `{near}`?"),
-        None if TOP_LEVEL.contains(&name) => {
+    let near = synonym.map(|(_, own)| *own).or_else(|| nearest(name, known.iter().copied()));
+    let help = match (gone::advice_in(name, &title), near) {
+        (Some(advice), _) => advice.to_owned(),
+        (None, Some(near)) => format!("did you mean `{near}`?"),
+        (None, None) if TOP_LEVEL.contains(&name) => {
             format!("`{name}` belongs to the whole scene: write it above the first line in [brackets]")
         }
-        None => format!("its keys are {}", known.join(", ")),
+        (None, None) => format!("its keys are {}", known.join(", ")),
     };
-    refusal(format!("unknown key `{name}` in {}", title(table))).label("unknown key").help(help)
+    refusal(format!("unknown key `{name}` in {title}")).label("unknown key").help(help)
 }
 
 /// Return the refusal of a value of the wrong kind or out of its range.
 fn wrong_value(refusal: impl Fn(String) -> Error, found: &Found<'_, '_>, message: &str) -> Error {
-    let schema = schema();
-    let schemas = at(&schema, found.path.iter().map(String::as_str));
-    let (kinds, about) = (kinds(&schemas), description(&schemas));
     let value = found.node.get_ref();
     let number = value.as_integer().map(|integer| i64::from_str_radix(integer.as_str(), integer.radix()));
     let is_too_large = |digits: &str| !digits.contains("inf") && digits.parse().is_ok_and(f64::is_infinite);
@@ -185,25 +155,29 @@ fn wrong_value(refusal: impl Fn(String) -> Error, found: &Found<'_, '_>, message
         DeValue::Array(_) => "a list",
         DeValue::Table(_) => "a table",
     };
-    let takes = |kind: &str| kinds.iter().any(|known| known.contains(kind));
-    let least = schemas.iter().find_map(|schema| schema["minimum"].as_i64());
-    if let Some(Ok(number)) = number
-        && takes("number")
-    {
-        let label = match least {
-            Some(least) if number < least => format!("must be {least} or more"),
-            _ => message.to_owned(),
-        };
-        let key = found.path.last().map_or("", String::as_str);
-        return refusal(format!("`{key}` is {number}")).label(label);
+    let what = match message.rsplit_once("expected ").map(|(_, what)| what) {
+        Some("usize" | "u64" | "i64") => "a whole number",
+        Some("f64") => "a number",
+        Some("a boolean") => "true or false",
+        Some("a sequence") => "a list",
+        Some(what) => what,
+        None if message.starts_with("wanted string") => "a string",
+        // the message tells what is wrong
+        None => "",
+    };
+    match number {
+        Some(Ok(number)) if ["", "a whole number"].contains(&what) => {
+            let key = found.path.last().map_or("", String::as_str);
+            let label = if what.is_empty() { message } else { "must be 0 or more" };
+            return refusal(format!("`{key}` is {number}")).label(label);
+        }
+        _ if what.is_empty() => return refusal(format!("`{}`: {message}", found.path.join("."))),
+        _ => {}
     }
-    if kinds.contains(&given) {
-        return refusal(format!("`{}`: {message}", found.path.join(".")));
-    }
-    let what = kinds.join(" or ");
     let error = refusal(format!("expected {what}, found {given}")).label(format!("not {what}"));
+    let about = about(&found.path);
     match value {
-        DeValue::String(text) if takes("number") && text.parse::<f64>().is_ok() => {
+        DeValue::String(text) if what.contains("number") && text.parse::<f64>().is_ok() => {
             error.help("write the number without quotes")
         }
         DeValue::Integer(_) | DeValue::Float(_) | DeValue::Boolean(_) if what == "a string" => {
@@ -227,9 +201,17 @@ fn title(path: &[String]) -> String {
     }
 }
 
-/// Return the schemas of the value at a path, below that of a scene.
-fn at<'s, 'p>(schema: &'s Json, path: impl Iterator<Item = &'p str>) -> Vec<&'s Json> {
-    path.fold(forms(schema), |schemas, key| below(&schemas, key))
+/// Return what the JSON schema says about the value at a path: the first paragraph of its description, and the default.
+fn about(path: &[String]) -> String {
+    let schema = schema();
+    let schemas = path.iter().fold(forms(&schema), |schemas, key| below(&schemas, key));
+    let Some(schema) = schemas.iter().find(|schema| schema["description"].is_string()) else { return String::new() };
+    let text = schema["description"].as_str().unwrap_or_default();
+    let paragraph = text.split("\n\n").next().unwrap_or_default().replace('\n', " ");
+    match &schema["default"] {
+        default @ (Json::Number(_) | Json::Bool(_) | Json::String(_)) => format!("{paragraph}; {default}"),
+        _ => paragraph,
+    }
 }
 
 /// Return the schemas of the values of a key of a table, or of the items of a list.
@@ -245,62 +227,4 @@ fn below<'s>(schemas: &[&'s Json], key: &str) -> Vec<&'s Json> {
 fn forms(schema: &Json) -> Vec<&Json> {
     let inner = schema["anyOf"].as_array().into_iter().flatten().flat_map(forms);
     std::iter::once(schema).chain(inner).collect()
-}
-
-/// Return the span of the first list that stands where a table belongs. serde would take its items for the values of
-/// the keys, in their order.
-fn list_for_table(node: &Spanned<DeValue<'_>>, schemas: &[&Json]) -> Option<Range<usize>> {
-    match node.get_ref() {
-        DeValue::Array(_) if !schemas.is_empty() && schemas.iter().all(|schema| schema.get("items").is_none()) => {
-            Some(node.span())
-        }
-        DeValue::Array(items) => {
-            let schemas = below(schemas, "");
-            items.iter().find_map(|item| list_for_table(item, &schemas))
-        }
-        DeValue::Table(table) => {
-            // serde refuses a table where a list belongs
-            let tables: Vec<&Json> = schemas.iter().copied().filter(|schema| schema.get("items").is_none()).collect();
-            table.iter().find_map(|(key, value)| list_for_table(value, &below(&tables, key.get_ref())))
-        }
-        _ => None,
-    }
-}
-
-/// Return the first paragraph of the description, with the default.
-fn description(schemas: &[&Json]) -> String {
-    let Some(schema) = schemas.iter().find(|schema| schema["description"].is_string()) else { return String::new() };
-    let text = schema["description"].as_str().unwrap_or_default();
-    let paragraph = text.split("\n\n").next().unwrap_or_default().replace('\n', " ");
-    match &schema["default"] {
-        default @ (Json::Number(_) | Json::Bool(_) | Json::String(_)) => format!("{paragraph}; {default}"),
-        _ => paragraph,
-    }
-}
-
-/// Return what the kinds of value are called in messages.
-fn kinds(schemas: &[&Json]) -> Vec<&'static str> {
-    let mut kinds = Vec::new();
-    for schema in schemas {
-        let types = match &schema["type"] {
-            Json::String(_) => vec![schema["type"].clone()],
-            Json::Array(types) => types.clone(),
-            _ => Vec::new(),
-        };
-        for kind in types {
-            let words = match kind.as_str().unwrap_or_default() {
-                "string" if schema["format"] == "expression" => "an expression",
-                "string" => "a string",
-                "number" => "a number",
-                "integer" => "a whole number",
-                "boolean" => "true or false",
-                "array" => "a list",
-                _ => "a table",
-            };
-            if !kinds.contains(&words) {
-                kinds.push(words);
-            }
-        }
-    }
-    kinds
 }

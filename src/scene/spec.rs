@@ -3,15 +3,15 @@
 use crate::contact::law::{LayerLaw, OwnLaws};
 use crate::data::Library;
 use crate::ddm::gamma::{GammaRule, OwnRules};
-use crate::error::{Error, Located, Place, Result, shown};
+use crate::error::{Error, Located, Place, Result, Source, shown};
 use crate::file::digest;
+use crate::problem::check::{Check, Fault, Find, at_least_one, positive};
+use crate::problem::compile::compile;
 use crate::problem::contact::Carrier;
-use crate::problem::data::DataKeys;
+use crate::problem::data::{DataKeys, library};
 use crate::problem::geometry::Geometry;
-use crate::problem::read::{
-    self, Check, Context, Either, Flaw, Form, all, at_least_one, checked, of_word, positive, within,
-};
-use crate::problem::{BodySpec, ContactSpec, MeshSource, MethodSpec, Plane, SolverSpec, Units};
+use crate::problem::read::{Either, Form, of_word, some_table, table, tables};
+use crate::problem::{BodySpec, ContactSpec, MeshSource, MethodName, MethodSpec, Plane, SolverSpec, Units};
 use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
 use serde::de::{Error as _, IgnoredAny};
@@ -39,27 +39,26 @@ pub struct Scene {
     /// words for labels, such as "mm, MPa"; nothing is converted
     pub units: Option<Units>,
     /// a file name, or a table: mesh = { geo = "a.geo", set = { n = 32 } }
-    #[serde(deserialize_with = "checked")]
     pub mesh: MeshSource,
     /// functions from files; each begins with a line [data.NAME]
     ///
     /// A file that no expression and no layer uses is not read.
-    #[serde(default, deserialize_with = "known_data", serialize_with = "crate::problem::data::write")]
+    #[serde(default, deserialize_with = "library", serialize_with = "crate::problem::data::write")]
     #[schemars(with = "BTreeMap<String, DataKeys>")]
     pub data: Library,
     /// a body starts with the line [[body]]
     ///
     /// The tables of bodies, in the order of the file. The name of a body may be a pattern, and so may the names of
     /// groups.
-    #[serde(rename = "body", deserialize_with = "all")]
+    #[serde(rename = "body", deserialize_with = "tables")]
     pub bodies: Vec<BodySpec>,
     /// a contact starts with the line [[contact]]
     ///
     /// Pairs of contact surfaces, and rules that find pairs on the mesh, in the order of the file.
-    #[serde(rename = "contact", default, deserialize_with = "all")]
+    #[serde(rename = "contact", default, deserialize_with = "tables")]
     pub contacts: Vec<ContactSpec>,
     /// the iteration; Newton's method without it
-    #[serde(default, deserialize_with = "checked")]
+    #[serde(default, deserialize_with = "table")]
     pub method: MethodSpec,
     /// the inner solver; chosen by the program without it
     #[serde(default)]
@@ -68,10 +67,10 @@ pub struct Scene {
     #[serde(default)]
     pub estimate: bool,
     /// adapts the mesh to an error: adapt = { error = 1e-2 }
-    #[serde(default, deserialize_with = "checked")]
+    #[serde(default, deserialize_with = "some_table")]
     pub adapt: Option<AdaptSpec>,
     /// what is written, and where
-    #[serde(default, deserialize_with = "checked")]
+    #[serde(default, deserialize_with = "table")]
     pub output: OutputSpec,
     /// Path of the scene file, as given.
     #[serde(skip)]
@@ -87,16 +86,52 @@ pub struct Scene {
     pub carriers: Vec<Carrier>,
 }
 
-/// Return the data, which are known before the scene is read.
-fn known_data<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Library, D::Error> {
-    IgnoredAny::deserialize(deserializer).map(|_| read::data())
+/// The settings that have an option of their own in several commands.
+#[derive(Debug, Clone, Default, clap::Args)]
+pub struct Flags {
+    /// Method: auto, robin, newton-robin, newton or semismooth (short for --set method.name=NAME)
+    #[arg(long, value_name = "NAME", hide_possible_values = true)]
+    pub method: Option<MethodName>,
+    /// Estimate the error of the discretisation (short for --set estimate=true)
+    #[arg(long)]
+    pub estimate: bool,
+    /// Adapt the mesh until the estimated errors of pressures and displacements, or of what adapt.of says, are at most
+    /// this (short for --set adapt.error=E)
+    #[arg(long, value_name = "E", allow_hyphen_values = true)]
+    pub tolerance: Option<f64>,
+}
+
+impl Flags {
+    /// Set them in a scene that was read, and return their places. A method that a sweep varies stays.
+    pub(super) fn apply(&self, scene: &mut Scene, find: &Find<'_>) -> BTreeMap<&'static str, Place> {
+        let typed = |name: &str, value: String| {
+            let (text, start) = (format!("{name} {value}"), name.len() + 1);
+            Place { span: start..text.len(), source: Source { name: name.to_owned(), text }.into() }
+        };
+        scene.estimate |= self.estimate;
+        let mut places = BTreeMap::new();
+        if let Some(error) = self.tolerance {
+            let error = Located::new(error, typed("--tolerance", shown(error)));
+            places.insert("adapt.error", error.place.clone());
+            let usual = || AdaptSpec { error: no_error(), of: Quantity::default(), cells: cells(), rounds: rounds() };
+            scene.adapt.get_or_insert_with(usual).error = error;
+        }
+        let is_varied = find("method.name").is_some_and(|place| place.source.name == "--over");
+        if let Some(name) = self.method.filter(|_| !is_varied) {
+            scene.method.name = name;
+            places.insert("method.name", typed("--method", name.name()));
+        }
+        places
+    }
 }
 
 /// The accuracy to which meshes are adapted, and the limits of adaptation.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("required" = ["error"]))]
 pub struct AdaptSpec {
     /// largest relative error of what `of` says: 0.01 is one per cent
+    #[serde(default = "no_error")]
     pub error: Located<f64>,
     /// which errors count: "all" (pressures and displacements), "pressures", "displacements" or "forces" of contacts
     #[serde(default)]
@@ -110,6 +145,8 @@ pub struct AdaptSpec {
     #[schemars(range(min = 1))]
     pub rounds: usize,
 }
+
+compile!(AdaptSpec { error } else { of, cells, rounds });
 
 /// The results whose errors adapt the mesh.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
@@ -126,6 +163,11 @@ pub enum Quantity {
     Forces,
 }
 
+/// Return the error of a table without one, which `--tolerance` may give.
+fn no_error() -> Located<f64> {
+    f64::NAN.into()
+}
+
 fn cells() -> usize {
     1_000_000
 }
@@ -135,11 +177,15 @@ fn rounds() -> usize {
 }
 
 impl Check for AdaptSpec {
-    fn check(&self, _: Geometry) -> Result<(), Flaw> {
+    fn check(&self, _: Geometry) -> Result<(), Fault> {
+        if self.error.is_nan() {
+            let help = "error: largest relative error of what `of` says: 0.01 is one per cent";
+            return Err(Fault::new("", "`adapt` has no `error`", "`error` is missing", help));
+        }
         positive("error", "the error", self.error.value)?;
         if self.error.value >= 1.0 {
             let message = format!("the error is {}", shown(self.error.value));
-            return Err(Flaw::new("error", message, "must be less than 1", "it is a share: 0.01 is one per cent"));
+            return Err(Fault::new("error", message, "must be less than 1", "it is a share: 0.01 is one per cent"));
         }
         at_least_one("cells", self.cells)?;
         at_least_one("rounds", self.rounds)
@@ -167,7 +213,11 @@ pub struct OutputSpec {
     /// whether to draw the SVG plots
     pub plots: bool,
     /// most pairs with files of their own; 24
-    pub pairs: Option<Most>,
+    ///
+    /// The largest number stands for all.
+    #[serde(deserialize_with = "pairs", serialize_with = "write_pairs")]
+    #[schemars(with = "Option<Either<usize, AllPairs>>")]
+    pub pairs: Option<usize>,
 }
 
 impl Default for OutputSpec {
@@ -185,9 +235,9 @@ impl Default for OutputSpec {
 }
 
 impl Check for OutputSpec {
-    fn check(&self, _: Geometry) -> Result<(), Flaw> {
+    fn check(&self, _: Geometry) -> Result<(), Fault> {
         match &self.dir {
-            Some(dir) if dir.as_os_str().is_empty() => Err(Flaw::new("dir", "the name is empty", "", "")),
+            Some(dir) if dir.as_os_str().is_empty() => Err(Fault::new("dir", "the name is empty", "", "")),
             _ => Ok(()),
         }
     }
@@ -203,32 +253,25 @@ pub enum Precision {
     Single,
 }
 
-/// The most pairs with files of their own; the largest number stands for all.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, JsonSchema)]
-#[schemars(with = "Either<usize, All>")]
-pub struct Most(pub usize);
-
 /// The word that stands for all pairs.
-#[derive(Deserialize, Serialize, JsonSchema)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
-enum All {
+enum AllPairs {
     All,
 }
 
-impl<'de> Deserialize<'de> for Most {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        match Form::<IgnoredAny>::deserialize(deserializer)? {
-            Form::Text(word) => of_word::<All, _>(&word).map(|_| Self(usize::MAX)),
-            Form::Integer(count) => usize::try_from(count).map(Self).map_err(|_| D::Error::custom("must be 0 or more")),
-            other => Err(other.unexpected()),
-        }
+/// Read a number of pairs, or the word for all.
+fn pairs<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<usize>, D::Error> {
+    let Located { value, place } = Located::<Form<IgnoredAny>>::deserialize(deserializer)?;
+    match value {
+        Form::Text(word) => of_word(&word).map(|AllPairs::All| Some(usize::MAX)),
+        Form::Integer(count) => usize::try_from(count).map(Some).map_err(|_| D::Error::custom("must be 0 or more")),
+        other => Err(other.instead_of("a whole number or \"all\"", &place)),
     }
 }
 
-impl Serialize for Most {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        if self.0 == usize::MAX { All::All.serialize(serializer) } else { self.0.serialize(serializer) }
-    }
+fn write_pairs<S: Serializer>(count: &Option<usize>, serializer: S) -> Result<S::Ok, S::Error> {
+    if *count == Some(usize::MAX) { serializer.serialize_str("all") } else { count.serialize(serializer) }
 }
 
 impl Scene {
@@ -311,34 +354,36 @@ impl Scene {
             let message = "several meshes for one scene: only the command line makes them";
             return Err(Error::scene(&self.dimension.place, message));
         }
-        self.verify()
+        self.verify(&|_| None)
     }
 
     /// Check the whole scene: each table by itself, and what tables have to do with each other.
-    pub(super) fn verify(&self) -> Result<()> {
+    pub(super) fn verify(&self, find: &Find<'_>) -> Result<()> {
         let place = &self.dimension.place;
         let geometry = self.geometry();
         if !(geometry.is_plane() || (geometry.dimension == 3 && self.plane == Plane::Strain)) {
             let message = "the dimension is 2 or 3, and only plane problems have a `plane`";
             return Err(Error::scene(place, message));
         }
-        self.mesh.refuse(geometry, place)?;
+        self.mesh.refuse(geometry, "mesh", find, place)?;
         if self.bodies.is_empty() {
             return Err(Error::scene(place, "the scene has no body").help("a body starts with the line [[body]]"));
         }
-        self.bodies.iter().try_for_each(|body| check_body(body, geometry))?;
-        for contact in &self.contacts {
-            let near = &contact.between[0].place;
-            contact.refuse(geometry, near)?;
-            contact.layer.refuse(geometry, near)?;
-            contact.tension.refuse(geometry, near)?;
+        for (number, body) in self.bodies.iter().enumerate() {
+            check_body(body, geometry, &format!("body.{number}"), find)?;
+        }
+        for (number, contact) in self.contacts.iter().enumerate() {
+            let (near, path) = (&contact.between[0].place, format!("contact.{number}"));
+            contact.refuse(geometry, &path, find, near)?;
+            contact.layer.refuse(geometry, &format!("{path}.layer"), find, near)?;
+            contact.tension.refuse(geometry, &format!("{path}.tension"), find, near)?;
         }
         self.check_names()?;
-        self.method.refuse(geometry, place)?;
-        self.method.steps.refuse(geometry, place)?;
-        self.method.stop.refuse(geometry, place)?;
-        self.adapt.refuse(geometry, place)?;
-        self.output.refuse(geometry, place)
+        self.method.refuse(geometry, "method", find, place)?;
+        self.method.steps.refuse(geometry, "method.steps", find, place)?;
+        self.method.stop.refuse(geometry, "method.stop", find, place)?;
+        self.adapt.refuse(geometry, "adapt", find, place)?;
+        self.output.refuse(geometry, "output", find, place)
     }
 
     /// Refuse bodies with one name, and contacts of one pair or rule.
@@ -386,8 +431,7 @@ impl Scene {
     /// A key that is missing here is also ignored where scenes are compared: by a restart, in a sweep, and between
     /// ranks.
     pub fn settings(&self) -> Json {
-        let context = Context { geometry: self.geometry(), ..Context::default() };
-        let mut settings = within(context, || serde_json::to_value(self)).unwrap_or_default();
+        let mut settings = serde_json::to_value(self).unwrap_or_default();
         without_null(&mut settings);
         if self.dimension.value == 3 {
             remove(&mut settings, "", &["plane"]);
@@ -419,12 +463,16 @@ impl Scene {
     }
 }
 
-fn check_body(body: &BodySpec, geometry: Geometry) -> Result<()> {
-    body.refuse(geometry, &body.name.place)?;
-    body.regions.iter().try_for_each(|region| region.refuse(geometry, &region.on.place))?;
-    body.fix.iter().try_for_each(|support| support.refuse(geometry, &support.on.place))?;
-    body.spring.iter().try_for_each(|spring| spring.refuse(geometry, &spring.on.place))?;
-    body.load.iter().try_for_each(|load| load.refuse(geometry, &load.on.place))
+/// Check the body at a path of the scene, and its lines.
+fn check_body(body: &BodySpec, geometry: Geometry, path: &str, find: &Find<'_>) -> Result<()> {
+    body.refuse(geometry, path, find, &body.name.place)?;
+    let line = |line: &dyn Check, key: &str, number: usize, on: &Located<String>| {
+        line.refuse(geometry, &format!("{path}.{key}.{number}"), find, &on.place)
+    };
+    body.regions.iter().enumerate().try_for_each(|(number, region)| line(region, "region", number, &region.on))?;
+    body.fix.iter().enumerate().try_for_each(|(number, support)| line(support, "fix", number, &support.on))?;
+    body.spring.iter().enumerate().try_for_each(|(number, spring)| line(spring, "spring", number, &spring.on))?;
+    body.load.iter().enumerate().try_for_each(|(number, load)| line(load, "load", number, &load.on))
 }
 
 /// Remove keys of the table at a place (a JSON pointer) of settings, if it is there.

@@ -40,12 +40,16 @@ stop = { increment = 1e-3 }
 
 /// Loads a text as `scene.toml`, with `groove.geo` and `groove.msh` beside it.
 fn load_text(text: &str, overrides: &[&str]) -> Result<Scene> {
+    load_with(text, overrides, &Flags::default())
+}
+
+fn load_with(text: &str, overrides: &[&str], flags: &Flags) -> Result<Scene> {
     let folder = tempfile::tempdir().expect("a folder");
     for (name, text) in [("scene.toml", text), ("groove.geo", ""), ("groove.msh", "")] {
         std::fs::write(folder.path().join(name), text).expect("a file");
     }
     let overrides: Vec<_> = overrides.iter().map(|text| text.to_string()).collect();
-    load(&folder.path().join("scene.toml"), &overrides)
+    parse(&folder.path().join("scene.toml"), text.to_owned(), &overrides, flags)
 }
 
 /// The constants of an isotropic, homogeneous body.
@@ -64,7 +68,7 @@ fn defaults_and_a_scene_in_space() {
     assert_eq!(scene.title, "scene");
     assert!(matches!(&scene.mesh, MeshSource::Msh { .. }));
     assert_eq!(scene.bodies[0].order, Order::P2);
-    assert!(matches!(scene.bodies[0].fix[0].value, [None, None, Some(Field::Constant(0.5))]));
+    assert!(matches!(scene.bodies[0].fix[0].components(), [None, None, Some(Field::Constant(0.5))]));
     assert_eq!(scene.bodies[0].force.as_ref().unwrap()[0].eval([1.0, 2.0, 3.0]), 3.0);
     assert!(scene.contacts.is_empty());
     assert!(matches!(scene.method.start, Start::Auto));
@@ -410,16 +414,52 @@ fn refusals_of_overrides_point_into_them() {
 }
 
 #[test]
-fn refusals_of_short_options_point_into_what_was_typed() {
-    for (text, marked, message) in [
-        ("--tolerance -1", "-1", "the error is -1"),
-        ("--tolerance 5", "5", "the error is 5"),
-        ("--tolerance ", "", "the value is missing"),
-        ("--tolerance much", "much", "expected a number, found a string"),
-        ("--method newtn", "newtn", "unknown word `newtn` for `method.name`"),
-        ("--over method.gamma=-1", "-1", "gamma is -1"),
-    ] {
-        let shown = refused(GROOVE, &[text], text, [marked, message, ""]);
-        assert!(shown.contains(&format!("1 | {}", text.trim_end())), "{shown}");
+fn refusals_of_flags_point_at_what_was_typed() {
+    refused(GROOVE, &["adapt.rounds=3"], "no error", ["adapt", "`adapt` has no `error`", "0.01"]);
+    for (tolerance, marked, message) in [(-1.0, "-1", "the error is -1"), (5.0, "5", "the error is 5")] {
+        let flags = Flags { tolerance: Some(tolerance), ..Flags::default() };
+        let error = load_with(GROOVE, &[], &flags).expect_err(message);
+        assert_eq!((error.message(), caret(&error).as_str()), (message, marked));
+        assert!(error.render(false).contains(&format!("1 | --tolerance {tolerance}")), "{error}");
     }
+    refused(GROOVE, &["--over method.gamma=-1"], "a sweep", ["-1", "gamma is -1", ""]);
+    // keys of the file that a method of the command line does not read stay without effect; those of options do not
+    let flags = Flags { method: Some(MethodName::Newton), estimate: true, tolerance: Some(0.02) };
+    let scene = load_with(GROOVE, &["adapt.rounds=3"], &flags).unwrap_or_else(|error| panic!("{error}"));
+    let adapt = scene.adapt.expect("an error");
+    assert_eq!(
+        (scene.method.name, scene.estimate, adapt.error.value, adapt.rounds),
+        (MethodName::Newton, true, 0.02, 3)
+    );
+    let error = load_with(GROOVE, &["adapt.error=0.1"], &Flags { tolerance: Some(7.0), ..Flags::default() });
+    assert_eq!(caret(&error.expect_err("a share")), "7");
+    let error = load_with(GROOVE, &["method.psi=full"], &flags).expect_err("no sweeps");
+    assert_eq!((error.message(), caret(&error).as_str()), ("the method `newton` does not read `psi`", "full"));
+    // a sweep over methods has its own
+    let scene = load_with(GROOVE, &["--over method.name=semismooth"], &flags).expect("a scene");
+    assert_eq!(scene.method.name, MethodName::Semismooth);
+}
+
+/// The second pass leaves no place without its text.
+#[test]
+fn every_place_has_its_text() {
+    let text = GROOVE.replacen("pressure = 10", "force = [1, 2], path = \"press\"", 1).replacen(
+        "order = 1",
+        "region = [{ on = \"core\", orthotropic = { E1 = \"x\", E2 = 1, E3 = 1, nu12 = 0, nu13 = 0, nu23 = 0, G12 = 1, \
+         G13 = 1, G23 = 1 }, axes = { first = [\"x\", 1] } }]\nspring = [{ on = \"a\", stiffness = [\"x\", 1] }]\nexact = \
+         [\"x\", 0]",
+        1,
+    );
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in [("scene.toml", text.as_str()), ("groove.geo", ""), ("steps.csv", "press, turn\n1, 2\n")] {
+        std::fs::write(folder.path().join(name), text).unwrap();
+    }
+    let obstacle = "[{on='a', obstacle=true, gap='turn', force='2*press', tilt='turn', at=[0, 1], \
+                    layer={pressure='c'}, reference='x'}, {between='auto', of=['u*', 'l*'], distance=1, bond=true, \
+                    layer={power={B='x', a=1}}, tension={linear={stiffness='x'}}}]";
+    let overrides = [format!("contact={obstacle}"), "method.steps.table=steps.csv".to_owned()];
+    let scene = load(&folder.path().join("scene.toml"), &overrides).unwrap_or_else(|error| panic!("{error}"));
+    let shown = format!("{scene:?}");
+    let unplaced: Vec<&str> = shown.split("Source { name: \"\", text: \"\" }, span: ").skip(1).collect();
+    assert!(unplaced.iter().all(|rest| rest.starts_with("0..0")), "{shown}");
 }

@@ -216,7 +216,7 @@ fn scenes_that_contradict_themselves_are_refused() {
     refused(&|s| s.method.stop.residual = None, "has a tolerance");
     refused(&|s| s.method.steps = History::of_shares(vec![0.5, 0.75]), "not the full load");
     refused(&|s| s.bodies[1] = s.bodies[1].clone().traction("top", [0.0, 0.0, 1.0]), "a load in z");
-    let force = |total| LoadKind::Force { total, rigid: false };
+    let force = |total: [f64; 3]| LoadKind::Force { total: total.into(), rigid: false };
     refused(&|s| s.bodies[1] = s.bodies[1].clone().load("top", force([0.0, f64::INFINITY, 0.0])), "the force is");
     // a refusal has the line of the program
     let scene = pressed(squares()).body(BodySpec::new("Upper", 1.0, 0.0));

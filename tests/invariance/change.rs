@@ -2,8 +2,8 @@
 
 use std::rc::Rc;
 use winkler::api::{
-    AxesSpec, BodySpec, ContactSpec, Error, Field, LayerSpec, LoadKind, MeshArrays, MeshSource, Orthotropic, Plane,
-    Result, Scene, SpringKind, Start,
+    AxesSpec, BodySpec, ContactSpec, Error, Field, LayerSpec, LoadKind, MeshArrays, MeshSource, OneOrVector,
+    Orthotropic, Plane, Result, Scene, Start, Vector,
 };
 use winkler::error::Located;
 use winkler::internals::expression::{Expression, KnownNames};
@@ -120,29 +120,29 @@ impl Change {
             self.anisotropic(&mut region.orthotropic, &mut region.anisotropic, &mut region.axes);
         }
         for fix in &mut body.fix {
-            let old = fix.value.clone();
-            let value = |i: usize| Some(self.field(old[self.axis[i]].as_ref()?, self.sign[i] * l));
-            fix.value = std::array::from_fn(value);
-            fix.normal = fix.normal.as_ref().map(|field| self.field(field, l));
+            let value = |i: usize| Some(self.field(fix.components()[self.axis[i]]?, self.sign[i] * l).into());
+            [fix.x, fix.y, fix.z] = [0, 1, 2].map(value);
+            fix.normal.iter_mut().for_each(|normal| normal.value = self.field(normal, l));
         }
         for load in &mut body.load {
             match &mut load.kind {
                 LoadKind::Pressure(field) => *field = self.field(field, s),
-                LoadKind::Traction(fields) => *fields = self.fields(fields, s),
-                LoadKind::Moment(moment) => *moment = self.moment(*moment, force),
+                LoadKind::Traction(fields) => *fields = self.fields(fields, s).into(),
+                LoadKind::Moment(moment) => *moment = self.moment(moment.axial(Field::number), force).into(),
                 LoadKind::Turning { force: total, moment } => {
-                    *total = self.vector(*total).map(|f| force * f);
-                    *moment = self.moment(*moment, force);
+                    *total = self.vector(total.numbers()).map(|f| force * f).into();
+                    *moment = self.moment(moment.axial(Field::number), force).into();
                 }
-                LoadKind::Force { total, .. } => *total = self.vector(*total).map(|f| force * f),
+                LoadKind::Force { total, .. } => *total = self.vector(total.numbers()).map(|f| force * f).into(),
             }
         }
         for spring in &mut body.spring {
             let is_point = mesh.group(&spring.on.value).is_some_and(|group| group.dimension == 0);
             let factor = if is_point { force / l } else { s / l };
-            match &mut spring.kind {
-                SpringKind::Normal(field) => *field = self.field(field, factor),
-                SpringKind::Vector(k) => *k = std::array::from_fn(|i| self.field(&k[self.axis[i]], factor)),
+            spring.normal.iter_mut().for_each(|normal| normal.value = self.field(normal, factor));
+            if let Some(k) = &mut spring.stiffness {
+                let along: [Field; 3] = std::array::from_fn(|i| self.field(&k[self.axis[i]], factor));
+                k.value = OneOrVector::Vector(along.into());
             }
         }
         body.force = body.force.as_ref().map(|fields| self.fields(fields, s / l).into());
@@ -171,10 +171,11 @@ impl Change {
         let constants = anisotropic.iter_mut().flat_map(|constants| &mut constants.value);
         constants.for_each(|constant| *constant = self.field(constant, self.stress));
         let constant = |v: [f64; 3]| v.map(Field::Constant);
-        let [first, second] = match axes.take().map(|axes| axes.value) {
-            None => [constant([1.0, 0.0, 0.0]), constant([0.0, 1.0, 0.0])],
-            Some(AxesSpec::Directions { first, second: Some(second) }) => [first, second],
-            Some(AxesSpec::Directions { first, second: None }) => {
+        let AxesSpec { first, second, angle, axis } = axes.take().map(|axes| axes.value).unwrap_or_default();
+        let fields = |vector: Located<Vector>| (*vector.value).clone();
+        let [first, second] = match (first.map(fields), second.map(fields), angle) {
+            (Some(first), Some(second), _) => [first, second],
+            (Some(first), None, _) => {
                 let across = |f: [f64; 3]| cross([0.0, 0.0, 1.0], f);
                 let old = first.clone();
                 let at = move |i: usize| {
@@ -183,13 +184,15 @@ impl Change {
                 };
                 [first, std::array::from_fn(at)]
             }
-            Some(AxesSpec::Angle { angle, axis }) => {
+            (None, _, Some(angle)) => {
+                let axis = axis.map_or_else(|| constant([0.0, 0.0, 1.0]), fields);
                 [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].map(|from| turned(from, &angle, &axis))
             }
+            (None, ..) => [constant([1.0, 0.0, 0.0]), constant([0.0, 1.0, 0.0])],
         };
         // the third axis is the cross product of these: orthotropic constants do not see its sign
-        let (first, second) = (self.fields(&first, 1.0), Some(self.fields(&second, 1.0)));
-        *axes = Some(AxesSpec::Directions { first, second }.into());
+        let [first, second] = [first, second].map(|fields| Some(Vector::from(self.fields(&fields, 1.0)).into()));
+        *axes = Some(AxesSpec { first, second, ..AxesSpec::default() }.into());
     }
 
     fn contact(&self, contact: &mut ContactSpec, dimension: usize) -> Result<()> {

@@ -8,7 +8,8 @@ use winkler::api::{Data, DataSpec, load};
 /// The heights of the case, as a scene has them.
 fn rough() -> Data {
     let scene = load(&case("rough"), &[]).expect("the case");
-    let data = Data::new(DataSpec { file: root().join("meshes/rough/rough.csv"), ..scene.data["rough"].spec.clone() });
+    let data =
+        Data::new(DataSpec { file: root().join("meshes/rough/rough.csv").into(), ..scene.data["rough"].spec.clone() });
     data.load().expect("its heights");
     data
 }
