@@ -35,9 +35,8 @@ pub struct BodySpec {
     /// whether each connected part of the group is a body, NAME_1, NAME_2, ...
     #[serde(default)]
     pub split: bool,
-    /// order of the elements, in space 1 or 2
-    #[serde(default)]
-    pub order: Order,
+    /// order of the elements, in space 1 or 2; without it 2, and on a mesh file that of the file
+    pub order: Option<Order>,
     /// supports: fix = [{ on = "base", x = 0, y = 0 }]
     ///
     /// They prescribe displacement components on named groups.
@@ -69,7 +68,7 @@ pub(super) fn one() -> f64 {
 }
 
 impl BodySpec {
-    /// Return an isotropic body of linear elements on the group of cells `name`. Young's modulus (a stress, > 0) and
+    /// Return an isotropic body on the group of cells `name`. Young's modulus (a stress, > 0) and
     /// Poisson's ratio (in (-1, 0.5)) are numbers or functions of the coordinates.
     #[track_caller]
     pub fn new(name: &str, young: impl Into<Field>, poisson: impl Into<Field>) -> Self {
@@ -86,7 +85,7 @@ impl BodySpec {
 
     /// Set the order of the elements, in which a script is meshed, too.
     pub fn order(self, order: Order) -> Self {
-        Self { order, ..self }
+        Self { order: Some(order), ..self }
     }
 
     /// Prescribe displacements (x, y in the plane, x, y, z in space; lengths) on a boundary or at points. `None` leaves
@@ -145,9 +144,9 @@ impl Check for BodySpec {
     fn check(&self, geometry: Geometry) -> Result<(), Flaw> {
         check_name(&self.name)?;
         self.material().check("[[body]]")?;
-        if self.order > Order::P2 && !geometry.is_plane() {
+        if let Some(order) = self.order.filter(|order| *order > Order::P2 && !geometry.is_plane()) {
             let help = "bodies in space are of order 1 or 2, in the plane from 1 to 8";
-            return Err(Flaw::new("order", format!("order {} in space", self.order.degree()), "", help));
+            return Err(Flaw::new("order", format!("order {} in space", order.degree()), "", help));
         }
         if geometry.is_plane() && self.force.as_ref().is_some_and(|force| !force[2].is_zero()) {
             return Err(Flaw::new("force", "a body force in z in a plane problem", "", ""));

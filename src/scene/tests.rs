@@ -63,7 +63,7 @@ fn defaults_and_a_scene_in_space() {
     let scene = load_text(text, &[]).unwrap();
     assert_eq!(scene.title, "scene");
     assert!(matches!(&scene.mesh, MeshSource::Msh { .. }));
-    assert_eq!(scene.bodies[0].order, Order::P2);
+    assert_eq!(scene.bodies[0].order, Some(Order::P2));
     assert!(matches!(scene.bodies[0].fix[0].value, [None, None, Some(Field::Constant(0.5))]));
     assert_eq!(scene.bodies[0].force.as_ref().unwrap()[0].eval([1.0, 2.0, 3.0]), 3.0);
     assert!(scene.contacts.is_empty());
@@ -101,7 +101,7 @@ fn overrides_replace_and_add() {
     )
     .unwrap();
     assert_eq!(isotropic(&scene.bodies[1]).0, 1e5);
-    assert_eq!([0, 1].map(|body| scene.bodies[body].order), [Order::P1, Order::P2]);
+    assert_eq!([0, 1].map(|body| scene.bodies[body].order), [Order::P1, Order::P2].map(Some));
     assert_eq!(scene.bodies[1].elasticity().place.source.name, "--set");
     let LoadKind::Traction(traction) = &scene.bodies[1].load[0].kind else { panic!() };
     assert_eq!(traction[1].eval([0.0; 3]), 2.0);
