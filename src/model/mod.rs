@@ -15,7 +15,7 @@ pub mod layer;
 pub mod linear;
 pub mod rigid;
 
-pub use crate::solver::cost::{BodyFacts, compactness};
+pub use crate::solver::cost::{BodyFacts, slenderness};
 pub use crate::solver::preset::INNER_TOLERANCE;
 pub use crate::solver::{BodyCounts, InterfaceDofs};
 pub use body::Body;
