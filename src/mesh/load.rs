@@ -47,8 +47,8 @@ pub enum MeshOrigin {
 /// [`Mesh::default_order`].
 ///
 /// Gmsh meshes a `.geo` script with the highest order, unless the cache has the result. A mesh file of another order
-/// serves, too: without the points inside its edges for order 1, and with straight edges if its own order is 1. Folded cells
-/// become straight ([`Mesh::straightened`]).
+/// serves, too: without the points inside its edges for order 1, and with straight edges if its own order is 1. Folded
+/// cells become straight ([`Mesh::straightened`]).
 ///
 /// # Errors
 /// A file cannot be read, or the script does not take a number. Gmsh is missing or fails. The mesh is not one of named

@@ -374,7 +374,7 @@ fn scene(settings: &Value) -> String {
             lines(&body["load"], ""),
         ]
     };
-    let columns = ["body", "material and order", "held by", "loads"];
+    let columns = ["body", "material", "held by", "loads"];
     table(&columns, settings["body"].as_array().into_iter().flatten().take(ROWS).map(row))
 }
 

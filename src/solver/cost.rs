@@ -20,9 +20,9 @@ const PRODUCT: f64 = 42.0 / 1e9;
 /// fronts, small fronts. Plates and slices, which have no large front, took 240 to 400.
 const FACTORED: f64 = 320.0;
 
-/// Time of multigrid in products with K, from its set-up to the last step of Newton's method, for a cube; the time of
-/// a body is 1 + s times half of it, where s is its slenderness. The scenes took 0.5 to 1.5 times as long.
-const MULTIGRID: f64 = 960.0;
+/// Time of multigrid over 1 + s in products with K, from its set-up to the last step of Newton's method, where s is the
+/// slenderness of a body. The scenes took 0.5 to 1.5 times as long, and a slice that cannot bend 0.3 times.
+const MULTIGRID: f64 = 480.0;
 
 /// Steps of Newton's method in a scene; those measured take 2 to 8, on the average 4.6.
 const NEWTON_STEPS: f64 = 5.0;
@@ -54,8 +54,8 @@ pub struct BodyFacts {
     pub options: Chosen,
 }
 
-/// Return the length of a body over its thickness, up to a factor: the largest side of its box times its surface over six
-/// times its volume. It is 1 for a cube or a ball, and a/(3 t) for a plate of a x a x t.
+/// Return the slenderness of a body, the largest side of its box times its surface over six times its volume. It is 1
+/// for a cube or a ball, and a/(3 t) for a thin plate of a x a x t.
 pub fn slenderness(length: f64, surface: f64, volume: f64) -> f64 {
     length * surface / (6.0 * volume)
 }
@@ -114,10 +114,8 @@ pub fn of_each(
     let dense = Cost { seconds: NEWTON_STEPS * interface.powi(3) / 3.0 / RATE, bytes: 36.0 * interface * interface };
     let sum = |of_body: &dyn Fn(&BodyFacts) -> Cost| bodies.iter().map(of_body).fold(Cost::default(), Cost::and);
     let in_each_step = |body: &BodyFacts| body.factored(0).times(NEWTON_STEPS * times);
-    let condensed = |body: &BodyFacts| match may_condense(body) {
-        true => body.factored(body.interface),
-        false => in_each_step(body),
-    };
+    let condensed =
+        |body: &BodyFacts| if may_condense(body) { body.factored(body.interface) } else { in_each_step(body) };
     [
         (Preset::Condensed, dense.and(sum(&condensed))),
         (Preset::Mumps, sum(&in_each_step)),
@@ -132,20 +130,21 @@ impl BodyFacts {
         plane_factor_bytes(self.dofs) + dense
     }
 
-    /// Return the cost of multigrid for a matrix of all bodies. The number of iterations grows with the slenderness s,
-    /// since a body that bends is soft beside its elements: cubes and balls took 50 to 110 for all steps and quadratic
-    /// elements, a plate with s = 28 took 855.
+    /// Return the cost of multigrid for a matrix of all bodies. The number of iterations grows with the slenderness,
+    /// since a slender body is soft in bending beside its elements: cubes and balls took 25 to 51 for all steps,
+    /// flanges, with s = 3.7, 109 to 172, and a plate with s = 28 took 855.
     fn multigrid(&self) -> Cost {
         let n = self.dofs as f64;
-        Cost { seconds: MULTIGRID * (1.0 + self.slenderness) / 2.0 * PRODUCT * n, bytes: LEVELS * n }
+        Cost { seconds: MULTIGRID * (1.0 + self.slenderness) * PRODUCT * n, bytes: LEVELS * n }
     }
 
     /// Return the cost of a factorisation by nested dissection that leaves some `interface` dofs.
     ///
-    /// The first separator of a cube with n dofs has S = 3 (n/3)^(2/3). Such a cut across the length of a plate or a
-    /// beam is smaller and has as many cuts of its size beside it as S^3 = 3 n^2/s tells. All fronts together take 19
-    /// n^2/s operations, measured on blocks of 32 000 to 500 000 dofs, about 6 S^3. They run at half the rate of a dense
-    /// matrix, except the last front, which also has the interface.
+    /// The first separator of a cube with n dofs has S = 3 (n/3)^(2/3) of them, S^3 = 3 n^2, and all fronts together
+    /// take 19 n^2 operations, measured on blocks of 32 000 to 500 000 dofs, about 6 S^3. A plate of m x m columns of k
+    /// nodes has S = 3 m k, and a beam of m^2 columns of k nodes has k/m separators of S = 3 m^2: both have S^3 = 3 n^2
+    /// over m/k or k/m, about s, in all. The fronts run at half the rate of a dense matrix, except the last one, which
+    /// also has the interface.
     fn factored(&self, interface: usize) -> Cost {
         let n = self.dofs as f64;
         let cubed = 3.0 * n * n / self.slenderness;

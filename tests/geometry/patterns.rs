@@ -321,8 +321,8 @@ fn what_does_not_fit_is_refused() {
     let cases: &[(&str, &str, &str, &[&str])] = &[
         ("\"brick_*\"", "\"brik_*\"", "", &["no group of cells matches `brik_*`", "brick_odd_1, brick_odd_2"]),
         (
-            "\"brick_odd_9\"\nyoung",
-            "\"brick_odd_*_9\"\nyoung",
+            "\"brick_odd_9\"\norder",
+            "\"brick_odd_*_9\"\norder",
             "name = \"brick_odd_*_9",
             &["no group of cells matches `brick_odd_*_9`"],
         ),

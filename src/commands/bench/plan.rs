@@ -158,11 +158,8 @@ fn names(scenes: &[Scene]) -> Vec<String> {
 fn orders_of(scene: &Scene) -> String {
     let default = matches!(scene.mesh, MeshSource::Geo(_)).then(Order::default);
     let orders: BTreeSet<_> = scene.bodies.iter().map(|body| body.order.or(default)).collect();
-    orders
-        .iter()
-        .map(|order| order.map_or("file".to_owned(), |order| order.degree().to_string()))
-        .collect::<Vec<_>>()
-        .join("+")
+    let word = |order: Option<Order>| order.map_or("file".to_owned(), |order| order.degree().to_string());
+    orders.into_iter().map(word).collect::<Vec<_>>().join("+")
 }
 
 /// Return the solvers of `--solver`, or all presets if there is none.
