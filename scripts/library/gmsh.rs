@@ -4,12 +4,13 @@
 //! cargo run --release --example gmsh
 //! ```
 
-use winkler::api::{BodySpec, ContactSpec, LayerSpec, MeshSource, Result, Scene, Session, Solution, solve};
+use winkler::api::{BodySpec, ContactSpec, LayerSpec, MeshSource, Order, Result, Scene, Session, Solution, solve};
 
 /// Solve the groove.
 pub fn groove(session: &Session) -> Result<Solution> {
     let half = |name: &str| {
         BodySpec::new(name, 2.1e5, 0.3)
+            .order(Order::P1)
             .fix(&format!("{name}_axis"), [Some(0.0), None])
             .fix(&format!("{name}_end"), [Some(0.0), Some(0.0)])
             .pressure(&format!("{name}_face"), 10.0)

@@ -147,7 +147,7 @@ impl AdaptiveRun {
             Rc::make_mut(&mut plan.scene).estimate = true;
             let mut linear = plan.scene.clone();
             // sizes and carriers are those of any order
-            Rc::make_mut(&mut linear).bodies.iter_mut().for_each(|body| body.order = Order::P1);
+            Rc::make_mut(&mut linear).bodies.iter_mut().for_each(|body| body.order = Some(Order::P1));
             let own = run::build(session, linear, interrupt, clock)?;
             let pace = plan.pace();
             let scene = Rc::make_mut(&mut plan.scene);
@@ -199,7 +199,7 @@ impl AdaptiveRun {
 
     /// Return how the meshes of this run follow each other: as those of the least order, which has most of the error.
     fn pace(&self) -> Pace {
-        Pace::of(self.scene.bodies.iter().map(|body| body.order.degree()).min().unwrap_or(1))
+        Pace::of(self.scene.bodies.iter().map(|body| body.order.unwrap_or_default().degree()).min().unwrap_or(1))
     }
 
     /// Return whether meshes are adapted to an error.

@@ -103,8 +103,13 @@ fn each_body(built: &Built) -> Vec<String> {
     let mut lines = Vec::new();
     for info in &built.discrete.bodies {
         lines.push(format!(
-            "  body {}: {} cells, {} nodes, {} dofs, {} of them supported",
-            info.name, info.cells, info.nodes, info.dofs, info.supported
+            "  body {}: {} cells of order {}, {} nodes, {} dofs, {} of them supported",
+            info.name,
+            info.cells,
+            info.order.degree(),
+            info.nodes,
+            info.dofs,
+            info.supported
         ));
         if !info.unconstrained.is_empty() {
             lines.push(format!("    rigid motions left to contact: {}", info.unconstrained.join("; ")));
@@ -125,9 +130,10 @@ fn all_bodies(built: &Built) -> Vec<String> {
         if least == most { least.to_string() } else { format!("{least} to {most}") }
     };
     let mut lines = vec![format!(
-        "  {} bodies: {} cells, {} nodes, {} dofs, {} of them supported; in each {} cells, {} dofs; --json has every one",
+        "  {} bodies: {} cells of order {}, {} nodes, {} dofs, {} of them supported; in each {} cells, {} dofs; --json has every one",
         bodies.len(),
         sum(|info| info.cells),
+        range(|info| info.order.degree()),
         sum(|info| info.nodes),
         sum(|info| info.dofs),
         sum(|info| info.supported),

@@ -12,7 +12,7 @@ use crate::output::closing::readable;
 use crate::output::folder::MARK_OF_MESH;
 use crate::output::terminal::ProgressLine;
 use crate::output::{refuse_foreign, say, write_whole};
-use crate::problem::{BodySpec, MeshSource, Order};
+use crate::problem::{BodySpec, MeshSource};
 use crate::run::{in_parts, made_straight};
 use crate::scene::Scene;
 use serde::Serialize;
@@ -122,11 +122,10 @@ fn facts<const D: usize>(
 ) -> Result<MeshFacts> {
     let read = scene.map_or_else(|| crate::mesh::files(source), inputs);
     request.output.as_ref().map_or(Ok(()), |path| check_output(path, &read))?;
-    let orders = scene.into_iter().flat_map(|scene| &scene.bodies).map(|body| body.order);
-    let order = orders.max().unwrap_or(Order::P1);
+    let orders: Vec<_> = scene.into_iter().flat_map(|scene| &scene.bodies).map(|body| body.order).collect();
     let began = Instant::now();
     let line = (!request.json).then(|| ProgressLine::new("mesh", None));
-    let Loaded { mesh, origin, file, notes, .. } = crate::mesh::load::<D>(source, order, interrupt)?;
+    let Loaded { mesh, origin, file, notes, .. } = crate::mesh::load::<D>(source, &orders, interrupt)?;
     drop(line);
     let seconds = began.elapsed().as_secs_f64();
     request.output.as_ref().map_or(Ok(()), |path| write(path, &file, D))?;
@@ -164,7 +163,7 @@ fn bodies<const D: usize>(verified: &Verified<D>) -> Result<Vec<BodyFacts>> {
     let facts = |(index, body): (usize, &BodySpec)| {
         let group = find_group(mesh, &body.name, &[D], "body")?;
         let checked = &verified.checked[index];
-        let space = Space::new(mesh, group, body.order);
+        let space = Space::new(mesh, group, body.order.unwrap_or_default());
         Ok(BodyFacts {
             name: body.name.value.clone(),
             cells: group.len(),

@@ -7,7 +7,7 @@ use crate::fem;
 use crate::linalg::dot;
 use crate::mesh::BodyCheck;
 use crate::model::BodySlot;
-use crate::problem::Plane;
+use crate::problem::{Order, Plane};
 use serde::{Deserialize, Serialize};
 use std::rc::Rc;
 
@@ -24,6 +24,8 @@ pub struct BodyInfo {
     pub cells: usize,
     /// Counts from the check of the mesh.
     pub facets: BodyCheck,
+    /// Order of its elements.
+    pub order: Order,
     /// Number of degrees of freedom, constrained ones included.
     pub dofs: usize,
     /// Number of constrained degrees of freedom.
@@ -93,6 +95,7 @@ impl<const D: usize> WholeBody<'_, D> {
             points: Vec::new(),
             cells: part.mesh.space.cell_count(),
             facets: BodyCheck { points: Vec::new(), ..checked.clone() },
+            order: part.mesh.space.order,
             dofs: part.mesh.space.dofs(),
             supported: part.mesh.held.supported(),
             unconstrained: part.mesh.unconstrained_modes.iter().map(|motion| motion.name.clone()).collect(),

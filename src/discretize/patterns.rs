@@ -20,9 +20,14 @@ use std::collections::{BTreeSet, HashMap};
 /// # Errors
 /// A table has no body, a group cannot name a body, a line acts on no body, or a total force acts on several surfaces.
 pub fn bodies<const D: usize>(scene: &Scene, mesh: &Mesh<D>, lying: &[Vec<u32>]) -> Result<Vec<BodySpec>> {
-    if !scene.bodies.iter().any(is_plural) {
-        return Ok(scene.bodies.clone());
-    }
+    let mut bodies =
+        if scene.bodies.iter().any(is_plural) { members_of_all(scene, mesh, lying)? } else { scene.bodies.clone() };
+    bodies.iter_mut().for_each(|body| body.order = body.order.or(Some(mesh.default_order)));
+    Ok(bodies)
+}
+
+/// Return the bodies of all tables, of which some stand for several bodies.
+fn members_of_all<const D: usize>(scene: &Scene, mesh: &Mesh<D>, lying: &[Vec<u32>]) -> Result<Vec<BodySpec>> {
     let (members, mut lying, mut bodies) = (members(scene, mesh)?, lying.iter(), Vec::new());
     for (table, names) in scene.bodies.iter().zip(&members) {
         let name = |name: &&str| Located::new((*name).to_owned(), table.name.place.clone());

@@ -19,7 +19,7 @@ use crate::error::Result;
 use crate::exchange::Plain;
 use crate::fem::rigid::AtDofs;
 use crate::mesh::BodyCheck;
-use crate::model::{BodyFacts, BodySlot, InterfaceDofs, Mechanism, compactness};
+use crate::model::{BodyFacts, BodySlot, InterfaceDofs, Mechanism, slenderness};
 use crate::problem::Order;
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
@@ -169,7 +169,7 @@ fn plan<const D: usize, F: Factory>(
             dofs: mesh.space.dofs(),
             interface: interface.dofs.len(),
             is_quadratic: mesh.space.order > Order::P1,
-            compactness: compactness(mesh.space.cell_count(), checked.outer),
+            slenderness: slenderness(mesh.extent.size(), checked.surface, mesh.space.measure()),
             ..BodyFacts::default()
         };
         (facts, interface)

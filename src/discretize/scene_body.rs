@@ -147,7 +147,7 @@ impl<'a, const D: usize> SceneBody<'a, D> {
     /// Return a warning if the largest Poisson's ratio is so large that linear elements are too stiff, except in plane
     /// stress. There the volume can hardly change.
     pub fn locking(&self, plane: Plane) -> Option<String> {
-        if self.spec.order > Order::P1 || (D == 2 && plane == Plane::Stress) {
+        if self.mesh.space.order > Order::P1 || (D == 2 && plane == Plane::Stress) {
             return None;
         }
         let places = || self.mesh.space.nodes.iter().map(|&x| self.mesh.space.in_scene(x));
@@ -274,7 +274,7 @@ pub fn parts<'a, const D: usize>(
 /// # Errors
 /// The mesh lacks the cells of the body, or a body of revolution has points of negative radius.
 fn space<const D: usize>(spec: &BodySpec, mesh: &Mesh<D>, plane: Plane) -> Result<Space<D>> {
-    let space = Space::new(mesh, find_group(mesh, &spec.name, &[D], "body")?, spec.order);
+    let space = Space::new(mesh, find_group(mesh, &spec.name, &[D], "body")?, spec.order.unwrap_or_default());
     if plane != Plane::Axisymmetric {
         return Ok(space);
     }

@@ -41,6 +41,7 @@ pub struct Verified<const D: usize> {
 struct MeshHeader {
     path: PathBuf,
     order: Order,
+    default_order: Order,
     /// Groups without elements.
     groups: Groups,
     split: usize,
@@ -138,10 +139,11 @@ impl<const D: usize> Verified<D> {
 
 impl MeshHeader {
     fn of<const D: usize>(verified: &Verified<D>) -> Self {
-        let Mesh { path, order, groups, split, straightened, .. } = &verified.mesh;
+        let Mesh { path, order, default_order, groups, split, straightened, .. } = &verified.mesh;
         Self {
             path: path.clone(),
             order: *order,
+            default_order: *default_order,
             groups: groups.without_simplices(),
             split: *split,
             straightened: *straightened,
@@ -152,8 +154,8 @@ impl MeshHeader {
 
     /// Return the facts of the mesh on a rank that has not read it.
     fn into_verified<const D: usize>(self, scene: &Scene) -> Result<Verified<D>> {
-        let Self { path, order, groups, split, straightened, points, lying } = self;
-        let mesh = Mesh { split, straightened, ..Mesh::new(path, Vec::new(), order, groups) };
+        let Self { path, order, default_order, groups, split, straightened, points, lying } = self;
+        let mesh = Mesh { default_order, split, straightened, ..Mesh::new(path, Vec::new(), order, groups) };
         let bodies = patterns::bodies(scene, &mesh, &lying)?;
         let scene = scene.clone();
         Ok(Verified { mesh, points, bodies, lying, scene, checked: Rc::new([]), notes: Vec::new() })
@@ -181,7 +183,11 @@ fn asked(body: &BodySpec) -> Asked<'_> {
     let loads = body.load.iter().map(|load| (load.on.value.as_str(), Duty::Acts));
     let springs = body.spring.iter().map(|spring| (spring.on.value.as_str(), Duty::Acts));
     let supports = body.fix.iter().map(|fix| (fix.on.value.as_str(), Duty::Holds));
-    Asked { name: &body.name.value, order: body.order, groups: loads.chain(springs).chain(supports).collect() }
+    Asked {
+        name: &body.name.value,
+        order: body.order.unwrap_or_default(),
+        groups: loads.chain(springs).chain(supports).collect(),
+    }
 }
 
 /// What a line of a scene needs of the group that it names.

@@ -43,27 +43,32 @@ pub enum MeshOrigin {
     Gmsh,
 }
 
-/// Load the mesh of a scene for displacements of an order, unless a signal ends it.
+/// Load the mesh of a scene for bodies of these orders, unless a signal ends it. Bodies of order `None` get the
+/// [`Mesh::default_order`].
 ///
-/// Gmsh meshes a `.geo` script with that order, unless the cache has the result. A mesh file of another order serves,
-/// too: without the points inside its edges for order 1, and with straight edges if its own order is 1. Folded cells
-/// become straight ([`Mesh::straightened`]).
+/// Gmsh meshes a `.geo` script with the highest order, unless the cache has the result. A mesh file of another order
+/// serves, too: without the points inside its edges for order 1, and with straight edges if its own order is 1. Folded
+/// cells become straight ([`Mesh::straightened`]).
 ///
 /// # Errors
 /// A file cannot be read, or the script does not take a number. Gmsh is missing or fails. The mesh is not one of named
 /// simplices in `D` dimensions (see [`parse`](super::parse)), or its order is too low. A signal arrives.
-pub fn load<const D: usize>(source: &MeshSource, order: Order, interrupt: &Interrupt) -> Result<Loaded<D>> {
+pub fn load<const D: usize>(source: &MeshSource, orders: &[Option<Order>], interrupt: &Interrupt) -> Result<Loaded<D>> {
+    let highest = |own: Order| orders.iter().map(|order| order.unwrap_or(own)).max().unwrap_or(own);
     let mut loaded = match source {
         MeshSource::Geo(source) => {
             if let (true, Some((name, _))) = (is_shape(&source.file), source.set.first()) {
                 return Err(Error::scene(&name.place, "numbers for a shape of another program, which has none")
                     .help("give sizes of elements by mesh = { geo = \"...\", size = 0.1 }, or a script (.geo) that merges the file"));
             }
-            Meshing { source, order, interrupt }.mesh(&Cache::of_user()?)
+            let order = highest(Order::default());
+            let mut made: Loaded<D> = Meshing { source, order, interrupt }.mesh(&Cache::of_user()?)?;
+            made.mesh.default_order = Order::default();
+            Ok(made)
         }
-        MeshSource::Msh { file } => from_file(file, order, interrupt),
+        MeshSource::Msh { file } => from_file(file, highest, interrupt),
         MeshSource::Arrays(arrays) => Ok(Loaded {
-            mesh: arrays::mesh(arrays, order)?,
+            mesh: arrays::mesh(arrays, highest(arrays.order))?,
             origin: MeshOrigin::File,
             file: PathBuf::new(),
             digest: String::new(),
@@ -90,7 +95,12 @@ pub fn files(source: &MeshSource) -> Vec<PathBuf> {
 /// Number of bytes at the start of a file that show its kind.
 const START: u64 = 1000;
 
-fn from_file<const D: usize>(file: &Located<PathBuf>, order: Order, interrupt: &Interrupt) -> Result<Loaded<D>> {
+/// Read a mesh file. Its mesh becomes one of the order that `highest` returns for the order of the file.
+fn from_file<const D: usize>(
+    file: &Located<PathBuf>,
+    highest: impl Fn(Order) -> Order,
+    interrupt: &Interrupt,
+) -> Result<Loaded<D>> {
     let path = &file.value;
     let mut start = Vec::new();
     let source = crate::file::open(path).map_err(|error| error.at(&file.place))?;
@@ -108,7 +118,7 @@ fn from_file<const D: usize>(file: &Located<PathBuf>, order: Order, interrupt: &
         true => converted(file, &whole()?, interrupt)?,
         false => read_file(path, path, MeshProducer::User, MeshOrigin::File)?,
     };
-    loaded.mesh = match (loaded.mesh.order, order) {
+    loaded.mesh = match (loaded.mesh.order, highest(loaded.mesh.order)) {
         (own, Order::P1) if own > Order::P1 => loaded.mesh.lower_order(),
         (Order::P1, order) if order > Order::P1 => loaded.mesh.higher_order(Order::P2),
         _ => loaded.mesh,

@@ -72,6 +72,8 @@ pub struct Mesh<const D: usize> {
     pub uncertainty: f64,
     /// Order of all elements; points have none.
     pub order: Order,
+    /// Order of bodies that name none: that of a mesh file or of arrays, else the default of made meshes.
+    pub default_order: Order,
     /// Named groups, in the order of the file.
     pub groups: Groups,
     /// Number of quadrangles, hexahedra, prisms and pyramids that were split into simplices.
@@ -83,7 +85,8 @@ pub struct Mesh<const D: usize> {
 impl<const D: usize> Mesh<D> {
     /// Return the mesh of these points and groups of simplices of one order, measured from the origin of the scene.
     pub fn new(path: PathBuf, points: Vec<[f64; D]>, order: Order, groups: Groups) -> Self {
-        Self { path, points, datum: [0.0; D], uncertainty: 0.0, order, groups, split: 0, straightened: 0 }
+        let (datum, default_order) = ([0.0; D], order);
+        Self { path, points, datum, uncertainty: 0.0, order, default_order, groups, split: 0, straightened: 0 }
     }
 
     /// Return the group with this name, of any dimension.

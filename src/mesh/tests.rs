@@ -412,13 +412,13 @@ fn mesh_files_serve_lower_and_higher_orders() {
     for order in ["1", "2"] {
         std::fs::write(folder.path().join(order), gmsh(SQUARE, &["-2", "-order", order])).unwrap();
     }
-    let load = |name: &str, order| load::<2>(&source(name), order, &Interrupt::default());
-    let loaded = load("2", Order::P1).unwrap();
+    let load = |name: &str, order| load::<2>(&source(name), &[order], &Interrupt::default());
+    let loaded = load("2", Some(Order::P1)).unwrap();
     assert_eq!((loaded.origin, loaded.mesh.order, loaded.mesh.points.len()), (MeshOrigin::File, Order::P1, 15));
-    assert_eq!(load("2", Order::P2).unwrap().mesh.order, Order::P2);
+    assert_eq!(load("2", Some(Order::P2)).unwrap().mesh.order, Order::P2);
     // the edges of the square are straight, so that both meshes of order 2 have the same points
     let sorted = |name: &str| {
-        let mut points = load(name, Order::P2).unwrap().mesh.points;
+        let mut points = load(name, Some(Order::P2)).unwrap().mesh.points;
         points.sort_by(|p, q| (p[0] + 2.0 * p[1]).total_cmp(&(q[0] + 2.0 * q[1])));
         points
     };
@@ -426,11 +426,11 @@ fn mesh_files_serve_lower_and_higher_orders() {
     assert_eq!(raised.len(), saved.len());
     assert!(raised.iter().zip(&saved).all(|(p, q)| (p[0] - q[0]).abs() + (p[1] - q[1]).abs() < 1e-12));
     assert!(
-        load("1", Order::new(4).unwrap()).unwrap().mesh.groups.iter().all(|group| {
+        load("1", Order::new(4)).unwrap().mesh.groups.iter().all(|group| {
             group.stride == [1, 3, 6][group.dimension] && group.connectivity.len() % group.stride == 0
         })
     );
-    let message = load("3", Order::P2).unwrap_err().to_string();
+    let message = load("3", Some(Order::P2)).unwrap_err().to_string();
     assert!(message.contains("cannot read") && message.contains("scene.toml"), "{message}");
 }
 

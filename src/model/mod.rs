@@ -16,7 +16,7 @@ pub mod linear;
 pub mod motions;
 pub mod rigid_parts;
 
-pub use crate::solver::cost::{BodyFacts, compactness};
+pub use crate::solver::cost::{BodyFacts, slenderness};
 pub use crate::solver::preset::INNER_TOLERANCE;
 pub use crate::solver::{BodyCounts, InterfaceDofs};
 pub use body::Body;

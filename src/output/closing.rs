@@ -5,6 +5,13 @@ use super::report::{
     StepReport, TensionReport, UnmetReport, busiest,
 };
 use super::{sci, seconds};
+use std::collections::BTreeSet;
+
+/// Return the orders of the elements of bodies in words, such as `2` or `1 and 2`.
+pub fn orders(bodies: &[BodyReport]) -> String {
+    let orders: BTreeSet<usize> = bodies.iter().map(|body| body.order).collect();
+    orders.iter().map(usize::to_string).collect::<Vec<_>>().join(" and ")
+}
 
 /// Format a number with `digits` after the point, or with an exponent if it is too small or too large for that.
 pub fn readable(value: f64, digits: usize) -> String {
@@ -117,13 +124,14 @@ impl Report {
             (None, None) => String::new(),
         };
         format!(
-            "  {}: {}, {}, {}, residual {}{error}, {} dofs, {} s",
+            "  {}: {}, {}, {}, residual {}{error}, {} dofs of order {}, {} s",
             self.method,
             counted(self.iterations, "iteration"),
             counted(self.sweeps, "sweep"),
             counted(self.factorizations, "factorization"),
             sci(self.residual.unwrap_or(f64::NAN), 2),
             self.dofs,
+            orders(&self.bodies),
             seconds(self.times.get("total").copied().unwrap_or(f64::NAN)),
         )
     }

@@ -206,6 +206,8 @@ pub struct BodyReport {
     pub inner_facets: usize,
     /// Facets of the boundary, which does not intersect itself.
     pub boundary_facets: usize,
+    /// Order of its elements.
+    pub order: usize,
     /// Degrees of freedom.
     pub dofs: usize,
     /// Inner solver in words; empty if nothing was solved.

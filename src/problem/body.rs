@@ -39,9 +39,8 @@ pub struct BodySpec {
     /// whether each connected part of the group is a body, NAME_1, NAME_2, ...
     #[serde(default)]
     pub split: bool,
-    /// order of the elements, in space 1 or 2
-    #[serde(default)]
-    pub order: Order,
+    /// order of the elements, in space 1 or 2; without it 2, and on a mesh file that of the file
+    pub order: Option<Order>,
     /// supports: fix = [{ on = "base", x = 0, y = 0 }]
     ///
     /// They prescribe displacement components on named groups.
@@ -72,7 +71,7 @@ compile!(BodySpec {
 } else { split, order, force_factor });
 
 impl BodySpec {
-    /// Return an isotropic body of linear elements on the group of cells `name`. Young's modulus (a stress, > 0) and
+    /// Return an isotropic body on the group of cells `name`. Young's modulus (a stress, > 0) and
     /// Poisson's ratio (in (-1, 0.5)) are numbers or functions of the coordinates.
     #[track_caller]
     pub fn new(name: &str, young: impl Into<Field>, poisson: impl Into<Field>) -> Self {
@@ -89,7 +88,7 @@ impl BodySpec {
 
     /// Set the order of the elements, in which a script is meshed, too.
     pub fn order(self, order: Order) -> Self {
-        Self { order, ..self }
+        Self { order: Some(order), ..self }
     }
 
     /// Prescribe displacements (x, y in the plane, x, y, z in space; lengths) on a boundary or at points. `None` leaves
@@ -147,9 +146,9 @@ impl Check for BodySpec {
     fn check(&self, geometry: Geometry) -> Result<(), Fault> {
         check_name(&self.name)?;
         self.material().check("[[body]]", geometry)?;
-        if self.order > Order::P2 && !geometry.is_plane() {
+        if let Some(order) = self.order.filter(|order| *order > Order::P2 && !geometry.is_plane()) {
             let help = "bodies in space are of order 1 or 2, in the plane from 1 to 8";
-            return Err(Fault::new("order", format!("order {} in space", self.order.degree()), "", help));
+            return Err(Fault::new("order", format!("order {} in space", order.degree()), "", help));
         }
         if let Some(force) = &self.force {
             force.check("force", geometry)?;

@@ -34,9 +34,10 @@ impl Order {
     }
 }
 
+/// The order of bodies that name none on a mesh of a script or shape, which is made in that order.
 impl Default for Order {
     fn default() -> Self {
-        Self::P1
+        Self::P2
     }
 }
 

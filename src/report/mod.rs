@@ -5,6 +5,7 @@ mod surface;
 
 pub use surface::Surface;
 
+use crate::output::closing::orders;
 use crate::output::{
     BodyReport, ForceReport, Mark, ObstacleReport, PairReport, Plot, Report, Role, RoundReport, UNSETTLED, escape,
     trimmed,
@@ -157,10 +158,11 @@ impl Page<'_> {
             (_, plane) => format!("in the plane (plane {})", plane.unwrap_or_default()),
         };
         let mut text = format!(
-            "{} {place}, {} of contact surfaces, {} degrees of freedom. Method <code>{}</code>, {}, {} sweeps.",
+            "{} {place}, {} of contact surfaces, {} degrees of freedom of order {}. Method <code>{}</code>, {}, {} sweeps.",
             counted(report.bodies.len(), "elastic body", "elastic bodies"),
             counted(report.pairs.len(), "pair", "pairs"),
             report.dofs,
+            orders(&report.bodies),
             report.method,
             counted(report.iterations, "iteration", "iterations"),
             report.sweeps
@@ -372,7 +374,7 @@ fn scene(settings: &Value) -> String {
             lines(&body["load"], ""),
         ]
     };
-    let columns = ["body", "material and order", "held by", "loads"];
+    let columns = ["body", "material", "held by", "loads"];
     table(&columns, settings["body"].as_array().into_iter().flatten().take(ROWS).map(row))
 }
 

@@ -13,7 +13,7 @@ use crate::mesh::{self, Loaded};
 use crate::output::Mark;
 use crate::parallel::{Ranks, collectively};
 use crate::petsc::Session;
-use crate::problem::{BodySpec, Order};
+use crate::problem::BodySpec;
 use crate::scene::Scene;
 use std::path::PathBuf;
 use std::rc::Rc;
@@ -104,12 +104,12 @@ where
     [f64; D]: Plain,
     [[f64; D]; D]: Plain,
 {
-    let order = scene.bodies.iter().map(|body| body.order).max().unwrap_or(Order::P1);
+    let orders: Vec<_> = scene.bodies.iter().map(|body| body.order).collect();
     let (mut file, mut notes) = (None, Vec::new());
     let read = || {
         interrupt.release()?;
         let Loaded { mesh, file: path, digest, without_hxt, notes: said, .. } =
-            mesh::load::<D>(&scene.mesh, order, interrupt)?;
+            mesh::load::<D>(&scene.mesh, &orders, interrupt)?;
         (file, notes) = (Some(MeshFile { digest, path, without_hxt }), said);
         Ok(mesh)
     };

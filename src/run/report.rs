@@ -147,6 +147,7 @@ fn body_report(info: &BodyInfo, solver: &str) -> BodyReport {
         cells: info.cells,
         inner_facets: info.facets.inner,
         boundary_facets: info.facets.outer,
+        order: info.order.degree(),
         dofs: info.dofs,
         solver: solver.to_owned(),
         rank: info.rank,

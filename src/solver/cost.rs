@@ -1,16 +1,14 @@
-//! What inner solvers cost: the choice between a factorisation and multigrid for bodies in space.
+//! What inner solvers cost, in CPU seconds: the choice among condensed bodies, a factorisation of all bodies in each
+//! step, and multigrid for bodies in space.
 //!
-//! Nested dissection of a cube with n dofs takes 19 n^2 operations, a dense contact of R dofs takes R^3/3 in each step,
-//! and multigrid takes some hundred products of K with a vector, whose time is that of reading the entries of K from
-//! memory. "The table" below are 29 scenes of 3564 to 215 622 dofs, cubes, grooves, spheres, flanges and rough faces;
-//! docs/solvers.md has some of them.
+//! docs/solvers.md has the formulas and the scenes on which they were measured, of 6000 to 85 000 dofs.
 
 use super::options::Chosen;
 use crate::linalg::portable::{log2, pow};
 use crate::problem::{MethodName, Preset};
 use serde::{Deserialize, Serialize};
 
-/// Dense operations a second, of two cores with AVX2 or one with AVX-512.
+/// Dense operations a second of a core: Newton's matrices of two flanges with 3893 and 4483 interface dofs.
 const RATE: f64 = 2.8e10;
 
 /// Seconds of a product of K with a vector, for each dof: 42 entries in a row of linear elements, 1e9 entries a second.
@@ -18,28 +16,21 @@ const RATE: f64 = 2.8e10;
 /// dof.
 const PRODUCT: f64 = 42.0 / 1e9;
 
-/// Time of a factorisation besides its dense operations, in products with K: finding an order, assembly of fronts,
-/// small fronts. Most scenes of the table took 100 to 400, thin slices less.
+/// Time of a factorisation besides the operations of large fronts, in products with K: finding an order, assembly of
+/// fronts, small fronts. Plates and slices, which have no large front, took 240 to 400.
 const FACTORED: f64 = 320.0;
 
-/// Time of multigrid from its set-up to the last step of Newton's method, in products with K. The scenes of the table
-/// took 690 to 1290 with linear elements and 380 to 1260 with quadratic ones. Most of that range is the number of
-/// iterations, which neither dofs nor shapes of cells predict.
-const MULTIGRID: f64 = 900.0;
+/// Time of multigrid over 1 + s in products with K, from its set-up to the last step of Newton's method, where s is the
+/// slenderness of a body. The scenes took 0.5 to 1.5 times as long, and a slice that cannot bend 0.3 times.
+const MULTIGRID: f64 = 480.0;
 
-/// Steps of Newton's method in a scene; those of the table take 3 to 7. Each has a dense factorisation of all contacts
-/// together.
+/// Steps of Newton's method in a scene; those measured take 2 to 8, on the average 4.6.
 const NEWTON_STEPS: f64 = 5.0;
 
 /// Bytes of multigrid for a dof: 12 for each entry of G, which is stored in place of K, 12 for hypre's copy, and half a
 /// copy for its levels. With quadratic elements the levels are those of the vertices. For two cubes of 48^3 this gives
 /// 890 MB. The run took 1153 MB, with 50 for the process and 180 for mesh, spaces and vectors.
 const LEVELS: f64 = 42.0 * 30.0;
-
-/// Operations of a factorisation with quadratic elements, relative to linear elements with the same number of dofs. A
-/// row of the matrix of quadratic elements has about twice as many entries. Cubes of 12^3 with quadratic elements took
-/// 1.2 times as long as cubes of 24^3 with linear elements.
-const FILL_P2: f64 = 1.2;
 
 /// A body before it is assembled, in the numbers on which its solver depends.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -54,8 +45,8 @@ pub struct BodyFacts {
     pub interface: usize,
     /// Whether its elements are of second or higher order.
     pub is_quadratic: bool,
-    /// See [`compactness`].
-    pub compactness: f64,
+    /// See [`slenderness`].
+    pub slenderness: f64,
     /// Whether a condensed body of an earlier scene serves, so that its memory is allocated already.
     pub is_kept: bool,
     /// Options of its solver, at first those that the user wrote.
@@ -63,11 +54,10 @@ pub struct BodyFacts {
     pub options: Chosen,
 }
 
-/// Return the number of cells over that of a cube with as many facets on its boundary, at most one. A cube of n x n x n
-/// boxes has 6 n^3 tetrahedra and 12 n^2 facets; a plate of 1:10 has a compactness of 0.4.
-pub fn compactness(cells: usize, facets: usize) -> f64 {
-    let cube = 6.0 * (facets as f64 / 12.0).powf(1.5);
-    (cells as f64 / cube).min(1.0)
+/// Return the slenderness of a body, the largest side of its box times its surface over six times its volume. It is 1
+/// for a cube or a ball, and a/(3 t) for a thin plate of a x a x t.
+pub fn slenderness(length: f64, surface: f64, volume: f64) -> f64 {
+    length * surface / (6.0 * volume)
 }
 
 /// Estimated time and memory of a solver.
@@ -97,20 +87,23 @@ impl Cost {
     fn and(self, other: Cost) -> Cost {
         Cost { seconds: self.seconds + other.seconds, bytes: self.bytes + other.bytes }
     }
+
+    /// Return the cost of the same work `count` times, one after another.
+    fn times(self, count: f64) -> Cost {
+        Cost { seconds: count * self.seconds, ..self }
+    }
 }
 
-/// Return the costs of both ways to solve for some bodies in space by a method, which may join them in one matrix: of
-/// condensed bodies, or of factored ones where nothing can be condensed, and of conjugate gradients with multigrid.
-/// `may_condense` says of each body whether it can be condensed; every factorisation of another one is of the whole
-/// body.
-pub fn of_both(
+/// Return the costs of the ways to solve for some bodies in space by a method, which may join them in one matrix:
+/// condensed bodies, a factorisation in each step, and conjugate gradients with multigrid. `may_condense` says of each
+/// body whether it can be condensed; another one is factored in each step.
+pub fn of_each(
     bodies: &[BodyFacts],
     may_condense: impl Fn(&BodyFacts) -> bool,
     method: MethodName,
     are_joined: bool,
-) -> [Cost; 2] {
-    // On the first scenes of the table `newton-robin` took 1.0 to 1.9 times as long as with one matrix of all bodies,
-    // and `robin` 5.4 to 12 times.
+) -> [(Preset, Cost); 3] {
+    // `newton-robin` took 1.0 to 1.9 times as long as with one matrix of all bodies, and `robin` 5.4 to 12 times
     let times = match method {
         _ if are_joined => 1.0,
         MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin => 1.2,
@@ -119,9 +112,15 @@ pub fn of_both(
     let interfaces = bodies.iter().filter(|body| may_condense(body)).map(|body| body.interface);
     let interface = if are_joined { interfaces.sum() } else { interfaces.max().unwrap_or(0) } as f64;
     let dense = Cost { seconds: NEWTON_STEPS * interface.powi(3) / 3.0 / RATE, bytes: 36.0 * interface * interface };
-    let direct = bodies.iter().map(|body| body.factored(may_condense(body))).fold(dense, Cost::and);
-    let multigrid = bodies.iter().map(|body| body.multigrid(times)).fold(Cost::default(), Cost::and);
-    [direct, multigrid]
+    let sum = |of_body: &dyn Fn(&BodyFacts) -> Cost| bodies.iter().map(of_body).fold(Cost::default(), Cost::and);
+    let in_each_step = |body: &BodyFacts| body.factored(0).times(NEWTON_STEPS * times);
+    let condensed =
+        |body: &BodyFacts| if may_condense(body) { body.factored(body.interface) } else { in_each_step(body) };
+    [
+        (Preset::Condensed, dense.and(sum(&condensed))),
+        (Preset::Mumps, sum(&in_each_step)),
+        (Preset::Hypre, sum(&|body| body.multigrid().times(times))),
+    ]
 }
 
 impl BodyFacts {
@@ -131,24 +130,29 @@ impl BodyFacts {
         plane_factor_bytes(self.dofs) + dense
     }
 
-    /// Return the cost of multigrid, `times` that of a matrix of all bodies.
-    fn multigrid(&self, times: f64) -> Cost {
+    /// Return the cost of multigrid for a matrix of all bodies. The number of iterations grows with the slenderness,
+    /// since a slender body is soft in bending beside its elements: cubes and balls took 25 to 51 for all steps,
+    /// flanges, with s = 3.7, 109 to 172, and a plate with s = 28 took 855.
+    fn multigrid(&self) -> Cost {
         let n = self.dofs as f64;
-        Cost { seconds: MULTIGRID * times * PRODUCT * n, bytes: LEVELS * n }
+        Cost { seconds: MULTIGRID * (1.0 + self.slenderness) * PRODUCT * n, bytes: LEVELS * n }
     }
 
-    /// Return the cost of the factorisation by nested dissection.
+    /// Return the cost of a factorisation by nested dissection that leaves some `interface` dofs.
     ///
-    /// A cube with n dofs takes 19 n^2 operations, measured on blocks of 32 000 to 500 000 dofs, and no body takes
-    /// more. A plate with m x m columns of k nodes is a plane grid of such columns, which takes some 20 m^3 (3 k)^3:
-    /// the fraction 3.2 k/m of a cube with as many nodes, which is about its compactness.
-    fn factored(&self, is_condensed: bool) -> Cost {
+    /// The first separator of a cube with n dofs has S = 3 (n/3)^(2/3) of them, S^3 = 3 n^2, and all fronts together
+    /// take 19 n^2 operations, measured on blocks of 32 000 to 500 000 dofs, about 6 S^3. A plate of m x m columns of k
+    /// nodes has S = 3 m k, and a beam of m^2 columns of k nodes has k/m separators of S = 3 m^2: both have S^3 = 3 n^2
+    /// over m/k or k/m, about s, in all. The fronts run at half the rate of a dense matrix, except the last one, which
+    /// also has the interface.
+    fn factored(&self, interface: usize) -> Cost {
         let n = self.dofs as f64;
-        let fill = if self.is_quadratic { FILL_P2 } else { 1.0 };
-        let seconds = 19.0 * n * n * self.compactness * fill / RATE + FACTORED * PRODUCT * n;
-        // a body that is not condensed is factored in each step
-        let times = if is_condensed { 1.0 } else { NEWTON_STEPS };
-        Cost { seconds: times * seconds, bytes: 220.0 * pow(n, 4.0 / 3.0) }
+        let cubed = 3.0 * n * n / self.slenderness;
+        let last = pow(cubed, 1.0 / 3.0) + interface as f64;
+        Cost {
+            seconds: (12.0 * cubed + last.powi(3)) / RATE + FACTORED * PRODUCT * n,
+            bytes: 220.0 * pow(n, 4.0 / 3.0),
+        }
     }
 }
 

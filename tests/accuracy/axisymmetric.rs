@@ -232,7 +232,7 @@ fn discs() {
 fn a_shell_under_pressure() {
     let text = format!(
         "dimension = 2\nplane = \"axisymmetric\"\nmesh = {{ geo = \"{}\", set = {{ no = 8 }} }}\nestimate = true\n\
-         [[body]]\nname = \"outer\"\nyoung = 7e4\npoisson = 0.2\nfix = [{{ on = \"outer_y\", y = 0 }}]\n\
+         [[body]]\nname = \"outer\"\norder = 1\nyoung = 7e4\npoisson = 0.2\nfix = [{{ on = \"outer_y\", y = 0 }}]\n\
          load = [{{ on = \"outer_face\", pressure = 10 }}, {{ on = \"outer_contact\", pressure = 8.485601823078518 }}]\n\
          exact = [{}]\n",
         root().join("meshes/rings/rings.geo").display(),
@@ -390,7 +390,7 @@ fn soft_layer() {
 fn normals_on_the_axis() {
     let scene = load_scene(&case("shells"), &[]).expect("a scene");
     for degree in [Order::P1, Order::P2] {
-        let mesh = load::<2>(&scene.mesh, degree, &Interrupt::default()).expect("a mesh").mesh;
+        let mesh = load::<2>(&scene.mesh, &[Some(degree)], &Interrupt::default()).expect("a mesh").mesh;
         let space = Space::new(&mesh, mesh.group("inner").expect("a body"), degree);
         let space = space.revolved();
         let facets = space.facets(mesh.group("inner_contact").expect("a surface"));
@@ -413,7 +413,7 @@ fn stress_along_the_circles() {
     let elasticity =
         Elasticity::new(&[&scene.bodies[0].elasticity()], Vec::new(), 2, scene.plane).expect("an isotropic material");
     for degree in [Order::P1, Order::P2] {
-        let mesh = load::<2>(&scene.mesh, degree, &Interrupt::default()).expect("a mesh").mesh;
+        let mesh = load::<2>(&scene.mesh, &[Some(degree)], &Interrupt::default()).expect("a mesh").mesh;
         let space = Space::new(&mesh, mesh.group("inner").expect("a body"), degree);
         let space = space.revolved();
         assert!(space.nodes.iter().any(|x| x[0] == 0.0), "the shell meets the axis");

@@ -105,7 +105,7 @@ const BLOCK: &str = "DefineConstant[ n = {8, Name \"n\"}, L = {2, Name \"L\"}, H
 /// Return the scene of a stiff block below a footing with these further keys.
 fn footing(keys: &str) -> Scene {
     let text = format!(
-        "dimension = 3\nmesh = {{ geo = \"mesh.geo\", set = {{ n = 16 }} }}\n[[body]]\nname = \"body\"\nyoung = 1e9\npoisson = 0\n\
+        "dimension = 3\nmesh = {{ geo = \"mesh.geo\", set = {{ n = 16 }} }}\n[[body]]\nname = \"body\"\norder = 1\nyoung = 1e9\npoisson = 0\n\
          fix = [{{ on = \"low\", z = 0 }}, {{ on = \"corner\", x = 0, y = 0 }}, {{ on = \"other\", y = 0 }}]\n\
          [[contact]]\non = \"high\"\nobstacle = true\nlayer = {{ linear = {{ stiffness = 1e3 }} }}\n{keys}\n"
     );
@@ -154,7 +154,7 @@ fn a_footing_lifts_off_biaxially() {
 fn a_footing_lifts_off_in_the_plane() {
     let text = |middle: &str| {
         format!(
-            "dimension = 2\nmesh = {{ geo = \"mesh.geo\", set = {{ n = 40 }} }}\n[[body]]\nname = \"body\"\nyoung = 1e9\npoisson = 0\n\
+            "dimension = 2\nmesh = {{ geo = \"mesh.geo\", set = {{ n = 40 }} }}\n[[body]]\nname = \"body\"\norder = 1\nyoung = 1e9\npoisson = 0\n\
              fix = [{{ on = \"low\", y = 0 }}, {{ on = \"corner\", x = 0 }}]\n[[contact]]\non = \"high\"\nobstacle = true\n\
              layer = {{ linear = {{ stiffness = 1e3 }} }}\nforce = 10\n{middle}\n"
         )
@@ -176,7 +176,7 @@ fn a_sphere_in_space() {
     let modulus = 1e5 / (1.0 - 0.09);
     let force = 4.0 * modulus / 150.0 / 4.0;
     let text = format!(
-        "dimension = 3\nmesh = {{ geo = \"mesh.geo\", set = {{ n = 16, m = 6, L = 2.5, H = 6 }} }}\n[[body]]\nname = \"body\"\nyoung = 1e5\n\
+        "dimension = 3\nmesh = {{ geo = \"mesh.geo\", set = {{ n = 16, m = 6, L = 2.5, H = 6 }} }}\n[[body]]\nname = \"body\"\norder = 1\nyoung = 1e5\n\
          poisson = 0.3\nfix = [{{ on = \"low\", z = 0 }}, {{ on = \"x0\", x = 0 }}, {{ on = \"y0\", y = 0 }}]\n[[contact]]\non = \"high\"\n\
          obstacle = true\ngap = \"(x^2 + y^2)/100\"\nlayer = {{ linear = {{ stiffness = 1e7 }} }}\nforce = {force}\n"
     );
@@ -260,7 +260,7 @@ fn obstacles_are_in_all_tables() {
 fn a_gap_changes_with_the_factors_of_load_steps() {
     let text = |gap: &str, table: &str| {
         format!(
-            "dimension = 2\nmesh = {{ geo = \"mesh.geo\", set = {{ n = 32 }} }}\n[[body]]\nname = \"body\"\nyoung = 1e5\npoisson = 0.3\n\
+            "dimension = 2\nmesh = {{ geo = \"mesh.geo\", set = {{ n = 32 }} }}\n[[body]]\nname = \"body\"\norder = 1\nyoung = 1e5\npoisson = 0.3\n\
              fix = [{{ on = \"low\", x = 0, y = 0 }}]\n[[contact]]\non = \"high\"\nobstacle = true\ngap = \"{gap}\"\napproach = 2e-3\n\
              layer = {{ linear = {{ stiffness = 1e6 }} }}\n[method]\n{table}\n"
         )

@@ -85,7 +85,7 @@ fn a_clamp_is_one_body() {
         Curve Loop(1)={1,2,3,4,5,6,7,8,9,10}; Plane Surface(1)={1}; Mesh.MeshSizeMax=0.3;
         Physical Surface(\"clamp\")={1}; Physical Curve(\"lower\")={3}; Physical Curve(\"upper\")={7}; Physical Curve(\"back\")={10};\n";
     let scene = Scene::new(
-        "dimension = 2\nmesh = \"clamp.geo\"\n[[body]]\nname = \"clamp\"\nyoung = 1e5\npoisson = 0.3\nfix = [{ on = \"back\", x = 0, y = 0 }]\n\
+        "dimension = 2\nmesh = \"clamp.geo\"\n[[body]]\nname = \"clamp\"\norder = 1\nyoung = 1e5\npoisson = 0.3\nfix = [{ on = \"back\", x = 0, y = 0 }]\n\
          [[contact]]\nbetween = [\"lower\", \"upper\"]\nbond = true\npreload = 10\nlayer = { linear = { stiffness = 1e4 } }\n",
     );
     std::fs::write(scene.path.with_file_name("clamp.geo"), SCRIPT).expect("a script");
@@ -120,7 +120,7 @@ fn a_clamp_is_one_body() {
 #[test]
 fn a_bolt_through_a_thin_plate() {
     let scene = Scene::new(
-        "dimension = 2\nmesh = \"plate.geo\"\n[[body]]\nname = \"plate\"\nyoung = 1e3\npoisson = 0\nfix = [{ on = \"pin\", x = 0, y = 0 }, { on = \"other\", y = 0 }]\n\
+        "dimension = 2\nmesh = \"plate.geo\"\n[[body]]\nname = \"plate\"\norder = 1\nyoung = 1e3\npoisson = 0\nfix = [{ on = \"pin\", x = 0, y = 0 }, { on = \"other\", y = 0 }]\n\
          [[contact]]\nbetween = [\"top\", \"bottom\"]\npreload = 10\nlayer = { linear = { stiffness = 1e3 } }\n",
     );
     let script = "Point(1)={0,0,0};Point(2)={2,0,0};Point(3)={2,h,0};Point(4)={0,h,0};
@@ -178,8 +178,8 @@ fn a_preload_is_kept_over_a_restart() {
 #[test]
 fn a_bolt_between_outer_faces() {
     let scene = Scene::new(
-        "dimension = 2\nmesh = \"plates.geo\"\n[[body]]\nname = \"lower\"\nyoung = 1e5\npoisson = 0\nfix = [{ on = \"pin\", x = 0 }, { on = \"nut\", y = 0 }]\n\
-         [[body]]\nname = \"upper\"\nyoung = 1e5\npoisson = 0\nfix = [{ on = \"pin\", x = 0 }]\nload = [{ on = \"head\", pressure = -1, path = \"service\" }]\n\
+        "dimension = 2\nmesh = \"plates.geo\"\n[[body]]\nname = \"lower\"\norder = 1\nyoung = 1e5\npoisson = 0\nfix = [{ on = \"pin\", x = 0 }, { on = \"nut\", y = 0 }]\n\
+         [[body]]\nname = \"upper\"\norder = 1\nyoung = 1e5\npoisson = 0\nfix = [{ on = \"pin\", x = 0 }]\nload = [{ on = \"head\", pressure = -1, path = \"service\" }]\n\
          [[contact]]\nbetween = [\"head\", \"nut\"]\npreload = 100\nlayer = { linear = { stiffness = 1e4 } }\n\
          [[contact]]\nbetween = [\"joint_upper\", \"joint_lower\"]\nlayer = { linear = { stiffness = 1e5 } }\n\
          [method]\nsteps = { table = \"service.csv\" }\n",

@@ -20,7 +20,7 @@ fn run(name: &str, set: &[&str]) -> crate::common::Report {
 /// The mesh of a case, with overrides.
 fn mesh<const D: usize>(name: &str, set: &str, order: Order) -> Mesh<D> {
     let scene = load_scene(&case(name), &[format!("mesh.set={set}")]).expect("a scene");
-    load::<D>(&scene.mesh, order, &Interrupt::default()).expect("a mesh").mesh
+    load::<D>(&scene.mesh, &[Some(order)], &Interrupt::default()).expect("a mesh").mesh
 }
 
 /// Observed order from errors on meshes, each twice as fine as the one before.
@@ -200,10 +200,10 @@ fn points_of_quadratic_triangles() {
         Physical Volume(\"large\") = {1}; Physical Surface(\"large_face\") = {6};\n\
         Physical Volume(\"small\") = {2}; Physical Surface(\"small_face\") = {11};\n";
     std::fs::write(folder.path().join("blocks.geo"), script).expect("a script");
-    let text = "dimension = 3\nmesh = { geo = \"blocks.geo\", set = { h = 0.3 } }\n[[body]]\nname = \"large\"\nyoung = 1\npoisson = 0.3\n";
+    let text = "dimension = 3\nmesh = { geo = \"blocks.geo\", set = { h = 0.3 } }\n[[body]]\nname = \"large\"\norder = 1\nyoung = 1\npoisson = 0.3\n";
     let path = folder.path().join("scene.toml");
     std::fs::write(&path, text).expect("a scene");
-    let mesh = load::<3>(&load_scene(&path, &[]).expect("a scene").mesh, Order::P2, &Interrupt::default())
+    let mesh = load::<3>(&load_scene(&path, &[]).expect("a scene").mesh, &[Some(Order::P2)], &Interrupt::default())
         .expect("a mesh")
         .mesh;
     // which nodes of a facet carry points: the vertices, or the mid-edges
@@ -245,13 +245,13 @@ fn volume_and_area_of_a_ball() {
         Mesh.MeshSizeMin = h; Mesh.MeshSizeMax = h;\n\
         Physical Volume(\"ball\") = {1}; Physical Surface(\"skin\") = {1};\n";
     std::fs::write(folder.path().join("ball.geo"), script).expect("a script");
-    let text = "dimension = 3\nmesh = { geo = \"ball.geo\", set = { h = 0.5 } }\n[[body]]\nname = \"ball\"\nyoung = 1\npoisson = 0.3\n";
+    let text = "dimension = 3\nmesh = { geo = \"ball.geo\", set = { h = 0.5 } }\n[[body]]\nname = \"ball\"\norder = 1\nyoung = 1\npoisson = 0.3\n";
     let path = folder.path().join("scene.toml");
     std::fs::write(&path, text).expect("a scene");
     for (degree, expected) in [(Order::P1, 1.7), (Order::P2, 3.5)] {
         let errors = [0.4, 0.2].map(|h| {
             let scene = load_scene(&path, &[format!("mesh.set.h={h}")]).expect("a scene");
-            let mesh = load::<3>(&scene.mesh, degree, &Interrupt::default()).expect("a mesh").mesh;
+            let mesh = load::<3>(&scene.mesh, &[Some(degree)], &Interrupt::default()).expect("a mesh").mesh;
             let space = Space::new(&mesh, mesh.group("ball").expect("a body"), degree);
             let volume = fem::body_force(&space, &|_| [1.0, 0.0, 0.0]).sum()[0];
             let facets = space.facets(mesh.group("skin").expect("a surface"));
@@ -297,8 +297,9 @@ fn pairs_are_found_on_the_mesh() {
     }
     // four blocks: each touches the one beside it and the one above, none its diagonal neighbour
     let quarters = automatic("stack", 0.01);
-    let text =
-        quarters.text.replace("[[contact]]", "[[body]]\nname = \"b4\"\nyoung = 1e5\npoisson = 0.3\n\n[[contact]]");
+    let text = quarters
+        .text
+        .replace("[[contact]]", "[[body]]\nname = \"b4\"\norder = 1\nyoung = 1e5\npoisson = 0.3\n\n[[contact]]");
     let quarters = Scene::new(text);
     let path = quarters.path.to_str().expect("a path");
     let checked =

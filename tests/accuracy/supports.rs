@@ -117,7 +117,7 @@ fn displacements_of_the_contact_itself() {
     let pressure = 0.008 / (2.0 / 100.0 + 1.0 / 300.0);
     let block = |name: &str, face: &str, u: f64, side: &str| {
         format!(
-            "[[body]]\nname = \"{name}\"\nyoung = 100\npoisson = 0\nfix = [{{ on = \"{name}_{face}\", y = {u} }}, \
+            "[[body]]\nname = \"{name}\"\norder = 1\nyoung = 100\npoisson = 0\nfix = [{{ on = \"{name}_{face}\", y = {u} }}, \
              {{ on = \"{name}_left\", x = 0, y = \"{side}\" }}]\n"
         )
     };
@@ -327,7 +327,7 @@ fn planes_of_symmetry_in_space() {
     std::fs::write(folder.path().join("patch.geo"), script.to_owned() + &faces.collect::<String>()).expect("a script");
     let body = |name: &str, rest: &str| {
         format!(
-            "[[body]]\nname = \"{name}\"\nyoung = 2.1e5\npoisson = 0.3\n{rest}\nfix = [{{ on = \"{name}_x\", symmetry = true }}, \
+            "[[body]]\nname = \"{name}\"\norder = 1\nyoung = 2.1e5\npoisson = 0.3\n{rest}\nfix = [{{ on = \"{name}_x\", symmetry = true }}, \
              {{ on = \"{name}_y\", symmetry = true }}"
         )
     };

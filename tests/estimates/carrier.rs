@@ -24,7 +24,7 @@ fn pressed(block: f64, name: &str, last: bool, args: &[&str]) -> Run {
     std::fs::write(&geo, GEO.replace("\"block\"", &format!("\"{name}\""))).expect("a script");
     let body = |name: &str, young: f64, fix: &str| {
         format!(
-            "[[body]]\nname = \"{name}\"\nyoung = {young}\npoisson = 0.3\nfix = [{{ on = \"mid\", x = 0 }}, {fix}]\n"
+            "[[body]]\nname = \"{name}\"\norder = 1\nyoung = {young}\npoisson = 0.3\nfix = [{{ on = \"mid\", x = 0 }}, {fix}]\n"
         )
     };
     let mut bodies = [

@@ -45,7 +45,7 @@ fn is_effective(estimated: f64, exact: f64, what: &str) {
 #[test]
 fn energy_of_a_block() {
     let text = format!(
-        "dimension = 2\nmesh = {{ geo = \"{}\", set = {{ n = 8 }} }}\n[[body]]\nname = \"lower\"\nyoung = 2.1e5\n\
+        "dimension = 2\nmesh = {{ geo = \"{}\", set = {{ n = 8 }} }}\n[[body]]\nname = \"lower\"\norder = 1\nyoung = 2.1e5\n\
          poisson = 0.3\nfix = [{{ on = \"lower_sides\", x = 0 }}, {{ on = \"lower_face\", y = 0 }}]\n\
          load = [{{ on = \"lower_top\", pressure = \"10*cos(pi*x)\" }}]\n",
         root().join("meshes/wavy/wavy.geo").display()
@@ -501,7 +501,7 @@ fn springs_that_only_hold() {
         let script = root().join("meshes/patch/patch.geo");
         let body = |name: &str, pressure: &str| {
             format!(
-                "[[body]]\nname = \"{name}\"\nyoung = 2.1e5\npoisson = 0.3\nload = [{{ on = \"{name}_face\", pressure = \"{pressure}\" }}]\n\
+                "[[body]]\nname = \"{name}\"\norder = 1\nyoung = 2.1e5\npoisson = 0.3\nload = [{{ on = \"{name}_face\", pressure = \"{pressure}\" }}]\n\
                  spring = [{{ on = \"{name}_face\", stiffness = {stiffness} }}]\n"
             )
         };
@@ -534,7 +534,7 @@ fn springs_that_only_hold() {
 #[test]
 fn an_estimate_as_large_as_the_solution_is_a_guess() {
     let scene = Scene::new(format!(
-        "dimension = 2\nestimate = true\nmesh = {{ geo = \"{}\", set = {{ n = 4 }} }}\n[[body]]\nname = \"lower\"\nyoung = 2.1e5\n\
+        "dimension = 2\nestimate = true\nmesh = {{ geo = \"{}\", set = {{ n = 4 }} }}\n[[body]]\nname = \"lower\"\norder = 1\nyoung = 2.1e5\n\
          poisson = 0.4999\nfix = [{{ on = \"lower_sides\", x = 0 }}, {{ on = \"lower_face\", y = 0 }}]\n\
          load = [{{ on = \"lower_top\", pressure = \"10*cos(4*pi*x)\" }}]\n",
         root().join("meshes/wavy/wavy.geo").display()

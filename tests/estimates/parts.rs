@@ -154,8 +154,8 @@ const FLUSH: &str = "DefineConstant[ n = {8, Name \"n\"} ];\n\
 fn pressures_at_the_end_of_one_surface() {
     let scene = Scene::new(
         "dimension = 2\nestimate = true\nmesh = { geo = \"flush.geo\" }\n\
-         [[body]]\nname = \"lower\"\nyoung = 1e3\npoisson = 0.3\nfix = [{ on = \"base\", y = 0 }, { on = \"sides\", x = 0 }]\n\
-         [[body]]\nname = \"upper\"\nyoung = 2e3\npoisson = 0.3\nload = [{ on = \"top\", pressure = \"1 + 0.2*x\" }]\n\
+         [[body]]\nname = \"lower\"\norder = 1\nyoung = 1e3\npoisson = 0.3\nfix = [{ on = \"base\", y = 0 }, { on = \"sides\", x = 0 }]\n\
+         [[body]]\nname = \"upper\"\norder = 1\nyoung = 2e3\npoisson = 0.3\nload = [{ on = \"top\", pressure = \"1 + 0.2*x\" }]\n\
          spring = [{ on = \"left\", stiffness = [1, 0] }]\n\
          [[contact]]\nbetween = [\"seat\", \"foot\"]\nlayer = { linear = { stiffness = 1e4 } }\n",
     );

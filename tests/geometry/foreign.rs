@@ -1,6 +1,6 @@
 //! Meshes and shapes of other programs: each gives the answer of the mesh that it came from.
 
-use crate::common::{Run, Scene, distance, root, solve, winkler};
+use crate::common::{Run, Scene, distance, root, solve, solve_on, winkler};
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -22,8 +22,8 @@ const NUMBERED: Names =
 fn scene(mesh: &str, names: &Names) -> Scene {
     let ([lower, upper], [bottom, low, high, top]) = (names.bodies, names.surfaces);
     Scene::new(format!(
-        "dimension = 3\nmesh = {mesh}\n[[body]]\nname = \"{lower}\"\nyoung = 2.1e5\npoisson = 0\n\
-         fix = [{{ on = \"{bottom}\", x = 0, y = 0, z = 0 }}]\n[[body]]\nname = \"{upper}\"\nyoung = 2.1e5\npoisson = 0\n\
+        "dimension = 3\nmesh = {mesh}\n[[body]]\nname = \"{lower}\"\norder = 1\nyoung = 2.1e5\npoisson = 0\n\
+         fix = [{{ on = \"{bottom}\", x = 0, y = 0, z = 0 }}]\n[[body]]\nname = \"{upper}\"\norder = 1\nyoung = 2.1e5\npoisson = 0\n\
          fix = [{{ on = \"{top}\", x = 0, y = 0 }}]\nload = [{{ on = \"{top}\", pressure = \"10 + 4*(x - 0.5)\" }}]\n[[contact]]\n\
          between = [\"{low}\", \"{high}\"]\nlayer = {{ linear = {{ stiffness = 1e5 }} }}\n"
     ))
@@ -175,7 +175,7 @@ fn shapes_are_meshed() {
     };
     let facets: String = faces.iter().flat_map(|[a, b, c, d]| [facet([*a, *b, *c]), facet([*a, *c, *d])]).collect();
     let scene = Scene::new(
-        "dimension = 3\nmesh = { geo = \"cube.stl\", size = 0.5 }\n[[body]]\nname = \"volume_1\"\nyoung = 1\npoisson = 0.3\n\
+        "dimension = 3\nmesh = { geo = \"cube.stl\", size = 0.5 }\n[[body]]\nname = \"volume_1\"\norder = 1\nyoung = 1\npoisson = 0.3\n\
          force = [0, 0, -3]\nfix = [{ on = \"surface_*\", x = 0, y = 0, z = 0 }]\n",
     );
     fs::write(scene.path.with_file_name("cube.stl"), format!("solid cube\n{facets}endsolid cube\n")).expect("a file");
@@ -235,8 +235,8 @@ const BLOCKS: &str = "*NODE, NSET=NALL\n1, 0., 0., 0.\n2, 1., 0., 0.\n3, 1., 1.,
 
 fn blocks(mesh: &str, load: &str, [floor, ltop, ubot, lid]: [&str; 4]) -> Scene {
     Scene::new(format!(
-        "dimension = 3\nmesh = \"{mesh}\"\n[[body]]\nname = \"lower\"\nyoung = 1e5\npoisson = 0\n\
-         fix = [{{ on = \"{floor}\", x = 0, y = 0, z = 0 }}]\n[[body]]\nname = \"upper\"\nyoung = 1e5\npoisson = 0\n\
+        "dimension = 3\nmesh = \"{mesh}\"\n[[body]]\nname = \"lower\"\norder = 1\nyoung = 1e5\npoisson = 0\n\
+         fix = [{{ on = \"{floor}\", x = 0, y = 0, z = 0 }}]\n[[body]]\nname = \"upper\"\norder = 1\nyoung = 1e5\npoisson = 0\n\
          fix = [{{ on = \"{lid}\", x = 0, y = 0 }}]\nload = [{{ on = \"{lid}\", {load} }}]\n[[contact]]\n\
          between = [\"{ltop}\", \"{ubot}\"]\nlayer = {{ linear = {{ stiffness = 1e6 }} }}\n"
     ))
@@ -525,4 +525,37 @@ fn advice_fits_the_file() {
     let text = made(&script, &["-0", "-format", "step"], "faces.step");
     let run = solved("faces.step", &text, "{ geo = \"faces.step\", size = 0.5 }", &NUMBERED);
     assert!(run.code == 4 && run.stderr.contains("faces without a solid"), "{}", run.said());
+}
+
+/// Bodies without an order have order 2 on the mesh of a script, and the order of a mesh file, on all ranks.
+#[test]
+fn bodies_without_an_order_have_that_of_the_mesh() {
+    let solved = |mesh: &str, file: Option<&str>, ranks: usize, sets: &[&str]| {
+        let scene = Scene::new(scene(mesh, &NAMED).text.replace("order = 1\n", ""));
+        if let Some(order) = file {
+            let text = made(&patch(), &["-3", "-order", order, "-format", "msh41"], "a.msh");
+            fs::write(scene.path.with_file_name("a.msh"), text).expect("a mesh");
+        }
+        let words: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
+        solve_on(ranks, &scene, &words).converged()
+    };
+    let script = format!("{{ geo = \"{}\" }}", patch().display());
+    for (mesh, file, default) in [(script.as_str(), None, 2), ("\"a.msh\"", Some("1"), 1), ("\"a.msh\"", Some("2"), 2)]
+    {
+        let orders = |run: &Run| [0, 1].map(|body| run.count(&format!("bodies/{body}/order")));
+        let of_all = |order: usize| [0, 1].map(|body| format!("body.{body}.order={order}"));
+        let known = solved(mesh, file, 1, &of_all(default).each_ref().map(String::as_str));
+        for ranks in [1, 2] {
+            let run = solved(mesh, file, ranks, &[]);
+            assert_eq!(orders(&run), [default; 2], "{mesh} {file:?}");
+            assert!(run.stdout.contains(&format!("dofs of order {default}, ")), "{}", run.said());
+            assert_eq!(run.count("dofs"), known.count("dofs"));
+            let off = run.number("pairs/0/peak_pressure") / known.number("pairs/0/peak_pressure") - 1.0;
+            assert!(off.abs() < 1e-9, "{mesh} {file:?}: {off}");
+            // an order of one body leaves the default of the other
+            let other = 3 - default;
+            let run = solved(mesh, file, ranks, &[&format!("body.upper.order={other}")]);
+            assert_eq!(orders(&run), [default, other], "{mesh} {file:?}");
+        }
+    }
 }

@@ -46,8 +46,8 @@ fn fit(dimension: usize, script: &str, pin: &str, gap: f64) -> Scene {
     let held = ["x = 0, y = 0", "x = 0, y = 0, z = 0"][dimension - 2];
     let scene = Scene::new(format!(
         "dimension = {dimension}\nmesh = {{ geo = \"fit.geo\" }}
-[[body]]\nname = \"hub\"\nyoung = 7e4\npoisson = 0.3\nfix = [{{ on = \"rim\", {held} }}]
-[[body]]\nname = \"pin\"\nyoung = 2.1e5\npoisson = 0.3\n{pin}
+[[body]]\nname = \"hub\"\norder = 1\nyoung = 7e4\npoisson = 0.3\nfix = [{{ on = \"rim\", {held} }}]
+[[body]]\nname = \"pin\"\norder = 1\nyoung = 2.1e5\npoisson = 0.3\n{pin}
 [[contact]]\nbetween = [\"bore\", \"shank\"]\ntouching = true\ngap = {gap}\nlayer = {{ linear = {{ stiffness = 1e6 }} }}\n"
     ));
     std::fs::write(scene.path.with_file_name("fit.geo"), script).expect("a script");

@@ -208,8 +208,9 @@ struct Script {
 impl Script {
     fn new(text: &str) -> Self {
         let script = Self { folder: tempfile::tempdir().expect("a folder") };
-        let scene = "dimension = 2\nmesh = { geo = \"a.geo\" }\n[[body]]\nname = \"all\"\nyoung = 1\npoisson = 0\n";
-        let scene = scene.to_owned() + "[[body]]\nname = \"other\"\nyoung = 1\npoisson = 0\n[[contact]]\n";
+        let scene =
+            "dimension = 2\nmesh = { geo = \"a.geo\" }\n[[body]]\nname = \"all\"\norder = 1\nyoung = 1\npoisson = 0\n";
+        let scene = scene.to_owned() + "[[body]]\nname = \"other\"\norder = 1\nyoung = 1\npoisson = 0\n[[contact]]\n";
         let scene = scene + "between = [\"top\", \"bottom\"]\nlayer = { linear = { stiffness = 1 } }\n";
         script.write("scene.toml", &scene);
         script.write("a.geo", &(text.to_owned() + SQUARES));
@@ -433,7 +434,7 @@ fn blocks(heights: &[f64]) -> String {
 fn parts_of_a_group_are_bodies() {
     let scene = |contact: &str, heights: &[f64]| {
         let scene = Scene::new(format!(
-            "dimension = 3\nmesh = \"a.inp\"\n[[body]]\nname = \"All Blocks\"\nsplit = true\nyoung = 1e5\npoisson = 0\n\
+            "dimension = 3\nmesh = \"a.inp\"\n[[body]]\nname = \"All Blocks\"\norder = 1\nsplit = true\nyoung = 1e5\npoisson = 0\n\
              fix = [{{ on = \"floor\", x = 0, y = 0, z = 0 }}, {{ on = \"LID\", x = 0, y = 0 }}]\n\
              load = [{{ on = \"LID\", pressure = 10 }}]\n{contact}layer = {{ linear = {{ stiffness = 1e6 }} }}\n"
         ));
@@ -462,7 +463,7 @@ fn parts_of_a_group_are_bodies() {
         }
     }
     // one part of another material, by its own name; and a pattern for the parts
-    let other = "[[body]]\nname = \"all_blocks_2\"\nyoung = 2e5\npoisson = 0\n";
+    let other = "[[body]]\nname = \"all_blocks_2\"\norder = 1\nyoung = 2e5\npoisson = 0\n";
     let other = other.to_owned() + "fix = [{ on = \"lid\", x = 0, y = 0 }]\nload = [{ on = \"lid\", pressure = 10 }]\n";
     let text = std::fs::read_to_string(&scene(auto, &[0.0, 1.0]).path).expect("a scene");
     let text =
@@ -499,7 +500,7 @@ fn by_version(folder: &Path, version: &str, geo: &str, threads: &str) -> (u64, V
     std::fs::write(&log, "").expect("a file");
     std::fs::write(folder.join("cube.geo"), geo).expect("a script");
     let scene = format!(
-        "dimension = 3\nmesh = {{ geo = \"cube.geo\"{threads} }}\n[[body]]\nname = \"all\"\nyoung = 1\npoisson = 0\n\
+        "dimension = 3\nmesh = {{ geo = \"cube.geo\"{threads} }}\n[[body]]\nname = \"all\"\norder = 1\nyoung = 1\npoisson = 0\n\
          fix = [{{ on = \"bottom\", x = 0, y = 0, z = 0 }}]\nload = [{{ on = \"top\", pressure = 1 }}]\n"
     );
     std::fs::write(folder.join("scene.toml"), scene).expect("a scene");

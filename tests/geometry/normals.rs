@@ -30,9 +30,9 @@ fn a_ring_between_flats_takes_the_same_force_on_any_mesh() {
     let layer = "layer = { linear = { stiffness = 1e4 } }";
     let text = format!(
         "dimension = 2\nplane = \"axisymmetric\"\nmesh = {{ geo = \"part.geo\" }}
-[[body]]\nname = \"below\"\nyoung = 2.1e5\npoisson = 0.3\nfix = [{{ on = \"floor\", y = 0 }}]
+[[body]]\nname = \"below\"\norder = 1\nyoung = 2.1e5\npoisson = 0.3\nfix = [{{ on = \"floor\", y = 0 }}]
 [[body]]\nname = \"ring\"\nyoung = 7\npoisson = 0.49\norder = 2
-[[body]]\nname = \"above\"\nyoung = 2.1e5\npoisson = 0.3\nfix = [{{ on = \"top\", y = -0.1 }}]
+[[body]]\nname = \"above\"\norder = 1\nyoung = 2.1e5\npoisson = 0.3\nfix = [{{ on = \"top\", y = -0.1 }}]
 [[contact]]\nbetween = [\"low\", \"skin\"]\n{layer}\n[[contact]]\nbetween = [\"high\", \"skin\"]\n{layer}\n"
     );
     for flat in ["0.6", "0.05"] {
@@ -64,9 +64,9 @@ fn both_faces_of_a_wedge_carry_half() {
             let [held, load] = [["x", "[0, -40]"], ["y", "[40, 0]"]][turn];
             let text = format!(
                 "dimension = 2\nmesh = {{ geo = \"part.geo\" }}
-[[body]]\nname = \"wedge\"\nyoung = 1e7\npoisson = 0.3\nfix = [{{ on = \"back\", {held} = 0 }}]
+[[body]]\nname = \"wedge\"\norder = 1\nyoung = 1e7\npoisson = 0.3\nfix = [{{ on = \"back\", {held} = 0 }}]
 load = [{{ on = \"back\", force = {load}, rigid = true }}]
-[[body]]\nname = \"block\"\nyoung = 1e3\npoisson = 0.3\nfix = [{{ on = \"floor\", x = 0, y = 0 }}]
+[[body]]\nname = \"block\"\norder = 1\nyoung = 1e3\npoisson = 0.3\nfix = [{{ on = \"floor\", x = 0, y = 0 }}]
 [[contact]]\nbetween = [\"nose\", \"face\"]\nedge = {edge}\nlayer = {{ linear = {{ stiffness = 1e4 }} }}\n"
             );
             let sets = [format!("mesh.set.beta={beta}"), format!("mesh.set.{more}")];
@@ -173,9 +173,9 @@ fn a_plate_carries_the_weight_of_a_ball() {
     for contact in ["between = [\"skin\", \"faces\"]", "between = \"auto\"\ndistance = 0.1"] {
         let text = format!(
             "dimension = 3\nmesh = {{ geo = \"part.geo\" }}
-[[body]]\nname = \"ball\"\nyoung = 1000\npoisson = 0.3\nforce = [0, 0, -0.5]
+[[body]]\nname = \"ball\"\norder = 1\nyoung = 1000\npoisson = 0.3\nforce = [0, 0, -0.5]
 spring = [{{ on = \"skin\", stiffness = 1e-4 }}]
-[[body]]\nname = \"plate\"\nyoung = 1000\npoisson = 0.3\nfix = [{{ on = \"floor\", x = 0, y = 0, z = 0 }}]
+[[body]]\nname = \"plate\"\norder = 1\nyoung = 1000\npoisson = 0.3\nfix = [{{ on = \"floor\", x = 0, y = 0, z = 0 }}]
 [[contact]]\n{contact}\nlayer = {{ linear = {{ stiffness = 1e4 }} }}\n"
         );
         let run = solve_here(scene(BALL, text), &[]).converged();

@@ -74,7 +74,7 @@ fn one_by_one() -> Scene {
     let (top, left) = load.split_once("}, ").expect("two loads");
     for brick in &bricks {
         let _ = writeln!(text, "[[body]]\nname = \"{}\"", brick.name);
-        for key in ["young", "poisson", "force"] {
+        for key in ["order", "young", "poisson", "force"] {
             let _ = writeln!(text, "{}", lines(key)[0]);
         }
         let bottom = (brick.row == 0).then_some("{ on = \"bottom\", y = 0 }");
@@ -173,6 +173,7 @@ layer = { linear = { stiffness = 3e3 } }
 
 [[body]]
 name = "brick_*"
+order = 1
 young = 1e4
 poisson = 0.2
 fix = [{ on = "right", x = 0 }]
@@ -189,6 +190,7 @@ load = [{ on = "top", traction = [0, -0.5] }, { on = "{body}_left", force = [1e-
 
 [[body]]
 name = "brick_odd_9"
+order = 1
 young = 1e4
 poisson = 0.2
 fix = [{ on = "*_9_right", symmetry = true }]
@@ -302,7 +304,7 @@ fn a_shared_corner_is_no_group() {
                 Physical Curve(\"left\") = {1};\nPhysical Curve(\"right\") = {3};\nTransfinite Curve {1 : 3, 11, 12, 21, 22} = 3;\n";
     std::fs::write(&script, text).expect("a script");
     let scene = Scene::new(format!(
-        "dimension = 2\nmesh = \"{}\"\n[[body]]\nname = \"cell_*\"\nyoung = 1\npoisson = 0\n\
+        "dimension = 2\nmesh = \"{}\"\n[[body]]\nname = \"cell_*\"\norder = 1\nyoung = 1\npoisson = 0\n\
          fix = [{{ on = \"bottom_?\", x = 0 }}, {{ on = \"{{body}}\", y = 0 }}]\nload = [{{ on = \"right\", pressure = 1e-3 }}]\n\
          [[contact]]\nbetween = \"auto\"\ndistance = 0.1\nlayer = {{ linear = {{ stiffness = 1 }} }}\n",
         script.display()
@@ -319,8 +321,8 @@ fn what_does_not_fit_is_refused() {
     let cases: &[(&str, &str, &str, &[&str])] = &[
         ("\"brick_*\"", "\"brik_*\"", "", &["no group of cells matches `brik_*`", "brick_odd_1, brick_odd_2"]),
         (
-            "\"brick_odd_9\"\nyoung",
-            "\"brick_odd_*_9\"\nyoung",
+            "\"brick_odd_9\"\norder",
+            "\"brick_odd_*_9\"\norder",
             "name = \"brick_odd_*_9",
             &["no group of cells matches `brick_odd_*_9`"],
         ),
@@ -456,8 +458,8 @@ fn named_surfaces_are_found_at_any_distance() {
     let scene = |contact: &str| {
         let text = format!(
             "dimension = 2\nplane = \"axisymmetric\"\nmesh = \"part.geo\"
-[[body]]\nname = \"plate\"\nyoung = 1e5\npoisson = 0.3\nfix = [{{ on = \"floor\", y = 0 }}]
-[[body]]\nname = \"stamp\"\nyoung = 1e5\npoisson = 0.3\nfix = [{{ on = \"back\", x = 0, y = -0.501 }}]
+[[body]]\nname = \"plate\"\norder = 1\nyoung = 1e5\npoisson = 0.3\nfix = [{{ on = \"floor\", y = 0 }}]
+[[body]]\nname = \"stamp\"\norder = 1\nyoung = 1e5\npoisson = 0.3\nfix = [{{ on = \"back\", x = 0, y = -0.501 }}]
 [[contact]]\n{contact}\nlayer = {{ linear = {{ stiffness = 1e7 }} }}\n"
         );
         beside(FAR, &text)
@@ -527,7 +529,7 @@ fn an_overlap_of_facets_is_told() {
 #[test]
 fn found_pairs_without_a_common_piece_are_left_out() {
     let text = "dimension = 3\nmesh = \"part.geo\"
-[[body]]\nname = \"grain_*\"\nyoung = 1e4\npoisson = 0.3
+[[body]]\nname = \"grain_*\"\norder = 1\nyoung = 1e4\npoisson = 0.3
 [[contact]]\nbetween = \"auto\"\ndistance = 0.01\nlayer = { linear = { stiffness = 1e9 } }\n";
     let scene = beside(include_str!("shapes/grains.geo"), text);
     let check = crate::common::winkler(&["check", scene.path.to_str().expect("a path")]);

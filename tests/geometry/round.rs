@@ -98,8 +98,8 @@ fn a_ball_on_a_plate_keeps_its_weight() {
     let text = |between: &str| {
         format!(
             "dimension = 3\nmesh = \"round.geo\"
-[[body]]\nname = \"ball\"\nyoung = 1000\npoisson = 0.3\nforce = [0, 0, -0.5]
-[[body]]\nname = \"plate\"\nyoung = 1000\npoisson = 0.3\nfix = [{{ on = \"base\", x = 0, y = 0, z = 0 }}]
+[[body]]\nname = \"ball\"\norder = 1\nyoung = 1000\npoisson = 0.3\nforce = [0, 0, -0.5]
+[[body]]\nname = \"plate\"\norder = 1\nyoung = 1000\npoisson = 0.3\nfix = [{{ on = \"base\", x = 0, y = 0, z = 0 }}]
 [[contact]]\n{between}\nlayer = {{ linear = {{ stiffness = 1e4 }} }}\n"
         )
     };
@@ -136,8 +136,8 @@ fn rings_of_a_press_fit_keep_their_pressures() {
     let text = |more: &str| {
         format!(
             "dimension = 2\nmesh = \"round.geo\"
-[[body]]\nname = \"inner\"\nyoung = 2.1e5\npoisson = 0.3\n{more}
-[[body]]\nname = \"outer\"\nyoung = 2.1e5\npoisson = 0.3\nfix = [{{ on = \"rim\", x = 0, y = 0 }}]
+[[body]]\nname = \"inner\"\norder = 1\nyoung = 2.1e5\npoisson = 0.3\n{more}
+[[body]]\nname = \"outer\"\norder = 1\nyoung = 2.1e5\npoisson = 0.3\nfix = [{{ on = \"rim\", x = 0, y = 0 }}]
 [[contact]]\nbetween = \"auto\"\ndistance = 0.1\nangle = 45\ntouching = true\ngap = -0.01\noverlap = \"compress\"\nlayer = {{ linear = {{ stiffness = 1e6 }} }}\n"
         )
     };
@@ -153,8 +153,8 @@ fn rings_of_a_press_fit_keep_their_pressures() {
 #[test]
 fn a_ball_in_a_cup_keeps_its_forces() {
     let text = "dimension = 3\nmesh = \"round.geo\"
-[[body]]\nname = \"ball\"\nyoung = 2.1e3\npoisson = 0.3\nforce = [0, 0, -1]
-[[body]]\nname = \"cup\"\nyoung = 2.1e3\npoisson = 0.3\nfix = [{ on = \"base\", x = 0, y = 0, z = 0 }]
+[[body]]\nname = \"ball\"\norder = 1\nyoung = 2.1e3\npoisson = 0.3\nforce = [0, 0, -1]
+[[body]]\nname = \"cup\"\norder = 1\nyoung = 2.1e3\npoisson = 0.3\nfix = [{ on = \"base\", x = 0, y = 0, z = 0 }]
 [[contact]]\nbetween = \"auto\"\ndistance = 1\ntouching = true\nlayer = { linear = { stiffness = 1e3 } }\n";
     let run = solve(scene(BALL, text), &[]).converged();
     let imbalance = run.number("bodies/0/balance/force_imbalance");

@@ -179,7 +179,7 @@ fn refuses(session: &Session) {
     refused(&|s| s.method = robin(Gamma::Own("mine".into())), "no rule for gamma is called `mine`", false);
     // arrays of order 1 get straight edges for a higher order
     let mut scene = pressed(squares());
-    scene.bodies[0].order = Order::P2;
+    scene.bodies[0].order = Some(Order::P2);
     assert!(solve(session, scene).expect("a solution").is_converged());
     // a rule that gives no number ends the run, and is seen in its status
     let mut scene = pressed(squares()).rule("lost", || Lost);

@@ -189,7 +189,7 @@ fn facets_beside_a_contact_are_open() {
     for soft in ["plate", "stud"] {
         let body = |name: &str, keys: &str| {
             let young = if name == soft { 1e4 } else { 1e5 };
-            format!("[[body]]\nname = \"{name}\"\nyoung = {young}\npoisson = 0\n{keys}\n")
+            format!("[[body]]\nname = \"{name}\"\norder = 1\nyoung = {young}\npoisson = 0\n{keys}\n")
         };
         let scene = Scene::new(format!(
             "dimension = 2\nmesh = \"plate.geo\"\n{}{}[[contact]]\nbetween = [\"plate_top\", \"stud_bottom\"]\nlayer = {{ linear = {{ stiffness = 1e4 }} }}\n",

@@ -513,8 +513,8 @@ fn two_layers_on_the_same_facets() {
             .map(|keys| format!("[[contact]]\n{keys}\nlayer = {{ linear = {{ stiffness = 1e5 }} }}\n"))
             .collect();
         let scene = Scene::new(format!(
-            "dimension = 2\nmesh = \"blocks.geo\"\n[[body]]\nname = \"lower\"\nyoung = 7e3\npoisson = 0\nfix = [{{ on = \"base\", x = 0, y = 0 }}]\n\
-             [[body]]\nname = \"upper\"\nyoung = 7e3\npoisson = 0\nfix = [{{ on = \"head\", x = 0 }}]\nload = [{{ on = \"head\", pressure = 3 }}]\n{}",
+            "dimension = 2\nmesh = \"blocks.geo\"\n[[body]]\nname = \"lower\"\norder = 1\nyoung = 7e3\npoisson = 0\nfix = [{{ on = \"base\", x = 0, y = 0 }}]\n\
+             [[body]]\nname = \"upper\"\norder = 1\nyoung = 7e3\npoisson = 0\nfix = [{{ on = \"head\", x = 0 }}]\nload = [{{ on = \"head\", pressure = 3 }}]\n{}",
             contacts.concat()
         ));
         std::fs::write(scene.path.with_file_name("blocks.geo"), BLOCKS).expect("a script");

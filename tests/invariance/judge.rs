@@ -2,7 +2,7 @@
 
 use super::change::Change;
 use std::path::Path;
-use winkler::api::{Constants, Field, MeshSource, Order, Plane, Result, Scene, Session, Solution, solve};
+use winkler::api::{Constants, Field, MeshSource, Plane, Result, Scene, Session, Solution, solve};
 use winkler::internals::Interrupt;
 use winkler::internals::bounds;
 
@@ -107,8 +107,8 @@ fn run_in<const D: usize>(
     scene: &mut Scene,
     kind: Option<&Kind>,
 ) -> Result<Option<(Answer, Change)>> {
-    let order = scene.bodies.iter().map(|body| body.order).max().unwrap_or(Order::P1);
-    let mesh = winkler::internals::mesh::load::<D>(&scene.mesh, order, &Interrupt::default())?.mesh;
+    let orders: Vec<_> = scene.bodies.iter().map(|body| body.order).collect();
+    let mesh = winkler::internals::mesh::load::<D>(&scene.mesh, &orders, &Interrupt::default())?.mesh;
     let [low, high] = bounds(mesh.points.iter().map(|&x| mesh.in_scene(x)));
     let size = (0..3).map(|c| high[c] - low[c]).fold(0.0, f64::max);
     let Some(change) = change::<D>(scene, size, kind) else { return Ok(None) };

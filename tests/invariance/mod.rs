@@ -72,7 +72,9 @@ fn two_pairs_far_from_each_other(session: &Session) {
     let (own, _): (Answer, Change) = judge::run(session, root(), &case, None).expect("solved").expect("a change");
     let set: Vec<String> = case.set.iter().map(|&set| set.to_owned()).collect();
     let mut scene = winkler::api::load(&root().join(case.scene), &set).expect("a scene");
-    let mesh = winkler::internals::mesh::load::<3>(&scene.mesh, Order::P2, &Interrupt::default()).expect("a mesh").mesh;
+    let mesh = winkler::internals::mesh::load::<3>(&scene.mesh, &[Some(Order::P2)], &Interrupt::default())
+        .expect("a mesh")
+        .mesh;
     let mut far = scene.clone();
     let mut change = Change::none();
     change.shift = [1e5 * 0.918_273_6, -7e4, 4.3e4];

@@ -162,9 +162,9 @@ fn an_axis_without_a_name() {
     let discs = ["lower", "middle", "upper"].into_iter().zip(0..).map(|(body, at)| disc(body, at));
     fs::write(folder.path().join("discs.geo"), discs.collect::<String>()).expect("written");
     let text = "dimension = 2\nplane = \"axisymmetric\"\nmesh = { geo = \"discs.geo\" }\n\
-                [[body]]\nname = \"lower\"\nyoung = 100\npoisson = 0.3\nfix = [{ on = \"lower_bottom\", y = 0 }]\n\
-                [[body]]\nname = \"middle\"\nyoung = 150\npoisson = 0.25\n\
-                [[body]]\nname = \"upper\"\nyoung = 200\npoisson = 0.2\nload = [{ on = \"upper_top\", pressure = 10 }]\n\
+                [[body]]\nname = \"lower\"\norder = 1\nyoung = 100\npoisson = 0.3\nfix = [{ on = \"lower_bottom\", y = 0 }]\n\
+                [[body]]\nname = \"middle\"\norder = 1\nyoung = 150\npoisson = 0.25\n\
+                [[body]]\nname = \"upper\"\norder = 1\nyoung = 200\npoisson = 0.2\nload = [{ on = \"upper_top\", pressure = 10 }]\n\
                 [[contact]]\nbetween = [\"lower_top\", \"middle_bottom\"]\nlayer = { linear = { stiffness = 50 } }\n\
                 [[contact]]\nbetween = [\"middle_top\", \"upper_bottom\"]\nlayer = { linear = { stiffness = 50 } }\n";
     let scene = folder.path().join("scene.toml");

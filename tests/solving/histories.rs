@@ -151,8 +151,8 @@ fn a_moment_does_not_push() {
         mesh.add("up", 2, 1, 4, |x| turn(x, 1.0));
         let scene = Scene::new(
             "dimension = 2\nmesh = \"blocks.msh\"
-[[body]]\nname = \"lo\"\nyoung = 1000\npoisson = 0.3\nfix = [{ on = \"lo_low\", x = 0, y = 0 }]
-[[body]]\nname = \"up\"\nyoung = 1000\npoisson = 0.3
+[[body]]\nname = \"lo\"\norder = 1\nyoung = 1000\npoisson = 0.3\nfix = [{ on = \"lo_low\", x = 0, y = 0 }]
+[[body]]\nname = \"up\"\norder = 1\nyoung = 1000\npoisson = 0.3
 load = [{ on = \"up_high\", pressure = 1 }, { on = \"up_side\", moment = 0.1 }]\nspring = [{ on = \"up_side\", stiffness = 1 }]
 [[contact]]\nbetween = [\"lo_high\", \"up_low\"]\nlayer = { linear = { stiffness = 1e4 } }\n",
         );
@@ -172,7 +172,8 @@ load = [{ on = \"up_high\", pressure = 1 }, { on = \"up_side\", moment = 0.1 }]\
 #[test]
 fn the_approach_is_that_of_the_far_faces() {
     let geo = root().join("meshes/stack/stack.geo");
-    let block = |name: &str, more: &str| format!("[[body]]\nname = \"{name}\"\nyoung = 100\npoisson = 0\n{more}\n",);
+    let block =
+        |name: &str, more: &str| format!("[[body]]\nname = \"{name}\"\norder = 1\nyoung = 100\npoisson = 0\n{more}\n",);
     let left = |name: &str| format!("{{ on = \"{name}_left\", x = 0 }}");
     let scene = |below: f64, upper: &str| {
         let lower = format!("fix = [{{ on = \"b1_bottom\", y = {below} }}, {}]", left("b1"));

@@ -15,7 +15,7 @@ fn one_mode(upper: &str, layer: &str, method: &str) -> Run {
     let geo = concat!(env!("CARGO_MANIFEST_DIR"), "/meshes/stack/stack.geo");
     let block = |name: &str, fix: &str| {
         format!(
-            "[[body]]\nname = \"{name}\"\nyoung = 100\npoisson = 0\nfix = [{fix}, {{ on = \"{name}_left\", x = 0 }}]\n"
+            "[[body]]\nname = \"{name}\"\norder = 1\nyoung = 100\npoisson = 0\nfix = [{fix}, {{ on = \"{name}_left\", x = 0 }}]\n"
         )
     };
     solve(

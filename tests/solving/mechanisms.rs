@@ -17,7 +17,7 @@ fn blocks([rows, columns]: [usize; 2], bodies: &[&str], contacts: &[[&str; 2]]) 
     let mut text = format!("dimension = 2\nmesh = {{ geo = \"{}\", set = {{ {set} }} }}\n", script.display());
     for (number, keys) in bodies.iter().enumerate() {
         let young = [2e5, 2e1][number % 2];
-        text += &format!("[[body]]\nname = \"b{}\"\nyoung = {young}\npoisson = 0.3\n{keys}\n", number + 1);
+        text += &format!("[[body]]\nname = \"b{}\"\norder = 1\nyoung = {young}\npoisson = 0.3\n{keys}\n", number + 1);
     }
     for [a, b] in contacts {
         text += &format!("[[contact]]\nbetween = [\"{a}\", \"{b}\"]\nlayer = {{ linear = {{ stiffness = 10 }} }}\n");
@@ -190,8 +190,8 @@ fn sizes_that_differ() {
     let scene = |at: f64| {
         let scene = Scene::new(
             "dimension = 2\nmesh = \"blocks.geo\"\n\
-             [[body]]\nname = \"large\"\nyoung = 2e5\npoisson = 0.3\nload = [{ on = \"under\", force = [0, 1e-3] }]\n\
-             [[body]]\nname = \"small\"\nyoung = 2e5\npoisson = 0.3\nload = [{ on = \"over\", pressure = 10 }]\n\
+             [[body]]\nname = \"large\"\norder = 1\nyoung = 2e5\npoisson = 0.3\nload = [{ on = \"under\", force = [0, 1e-3] }]\n\
+             [[body]]\nname = \"small\"\norder = 1\nyoung = 2e5\npoisson = 0.3\nload = [{ on = \"over\", pressure = 10 }]\n\
              [[contact]]\nbetween = [\"top\", \"bottom\"]\nlayer = { linear = { stiffness = 1e9 } }\n",
         );
         let block = |first: usize, [x, y]: [f64; 2], size: f64, n: usize, names: [&str; 3]| {
@@ -266,8 +266,8 @@ fn an_overlap_that_no_load_keeps() {
 fn domes(lower: f64, traction: f64) -> Scene {
     let text = format!(
         "dimension = 2\nmesh = {{ geo = \"domes.geo\", set = {{ h = {lower} }} }}\n\
-         [[body]]\nname = \"lower\"\nyoung = 2e5\npoisson = 0.3\nload = [{{ on = \"under\", traction = [0, 10] }}]\n\
-         [[body]]\nname = \"upper\"\nyoung = 2e5\npoisson = 0.3\nload = [{{ on = \"over\", traction = [0, {}] }}]\n\
+         [[body]]\nname = \"lower\"\norder = 1\nyoung = 2e5\npoisson = 0.3\nload = [{{ on = \"under\", traction = [0, 10] }}]\n\
+         [[body]]\nname = \"upper\"\norder = 1\nyoung = 2e5\npoisson = 0.3\nload = [{{ on = \"over\", traction = [0, {}] }}]\n\
          [[contact]]\nbetween = [\"top\", \"bottom\"]\nlayer = {{ linear = {{ stiffness = 1e6 }} }}\n",
         -traction
     );
@@ -381,7 +381,7 @@ MeshSize{:} = 0.5;
 fn balanced_bolts_are_enough_on_every_mesh() {
     let body = |name: &str, force: f64| {
         format!(
-            "[[body]]\nname = \"{name}\"\nyoung = 2e5\npoisson = 0.3\nload = [{{ on = \"{name}_bolts\", force = [0, 0, {force}] }}]\n"
+            "[[body]]\nname = \"{name}\"\norder = 1\nyoung = 2e5\npoisson = 0.3\nload = [{{ on = \"{name}_bolts\", force = [0, 0, {force}] }}]\n"
         )
     };
     let scene = Scene::new(format!(

@@ -186,7 +186,7 @@ fn a_tower_takes_as_long_as_a_wall() {
         for block in 1..=rows {
             let bottom = if block == 1 { "{ on = \"b1_bottom\", y = 0 }, " } else { "" };
             let fix = format!("fix = [{bottom}{{ on = \"b{block}_left\", x = 0 }}]");
-            text += &format!("[[body]]\nname = \"b{block}\"\nyoung = 2.1e5\npoisson = 0.3\n{fix}\n");
+            text += &format!("[[body]]\nname = \"b{block}\"\norder = 1\nyoung = 2.1e5\npoisson = 0.3\n{fix}\n");
         }
         text += &format!("load = [{{ on = \"b{rows}_top\", pressure = \"10 + 2*x\" }}]\n");
         for block in 1..rows {

@@ -9,7 +9,7 @@ fn blocks([lower, upper]: [f64; 2], method: &str) -> Scene {
     let geo = concat!(env!("CARGO_MANIFEST_DIR"), "/meshes/stack/stack.geo");
     let block = |name: &str, young: f64, fix: &str| {
         format!(
-            "[[body]]\nname = \"{name}\"\nyoung = {young}\npoisson = 0\nfix = [{fix}, {{ on = \"{name}_left\", x = 0 }}]\n"
+            "[[body]]\nname = \"{name}\"\norder = 1\nyoung = {young}\npoisson = 0\nfix = [{fix}, {{ on = \"{name}_left\", x = 0 }}]\n"
         )
     };
     Scene::new(format!(

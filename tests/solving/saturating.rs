@@ -41,11 +41,13 @@ const ROUND: Punch = Punch {
     scene: r#"plane = "axisymmetric"
 [[body]]
 name = "lo"
+order = 1
 young = 3511.6364540865293
 poisson = 0.3
 fix = [{ on = "lo_bottom", y = 0 }, { on = "lo_left", x = 0 }]
 [[body]]
 name = "up"
+order = 1
 young = 62559.32605892774
 poisson = 0.3
 load = [{ on = "up_top", pressure = "2.009317369043762*(1 - 0.0192458454741693*x)" }]
@@ -84,11 +86,13 @@ fn steps_that_lead_too_far_do_not_repeat() {
                 scene: r#"plane = "axisymmetric"
 [[body]]
 name = "lo"
+order = 1
 young = 7000
 poisson = 0.3
 fix = [{ on = "lo_bottom", y = 0 }, { on = "lo_left", x = 0 }]
 [[body]]
 name = "up"
+order = 1
 young = 90000
 poisson = 0.3
 load = [{ on = "up_top", pressure = 3.992725970947909 }]
@@ -107,11 +111,13 @@ layer = { table = [[1.657e-4, 5.76234], [100, 5.78743376]] }
                 scene: r#"plane = "stress"
 [[body]]
 name = "lo"
+order = 1
 young = 555.9666467349757
 poisson = 0.3
 fix = [{ on = "lo_bottom", y = 0 }, { on = "lo_left", x = 0 }]
 [[body]]
 name = "up"
+order = 1
 young = 13395.220586773656
 poisson = 0.3
 fix = [{ on = "up_left", x = 0 }]
@@ -131,11 +137,13 @@ layer = { table = [[7.977e-4, 4.89579638], [10, 4.89585471255]] }
                 scene: r#"plane = "stress"
 [[body]]
 name = "lo"
+order = 1
 young = 2637.351256909551
 poisson = 0.3
 fix = [{ on = "lo_bottom", y = 0 }, { on = "lo_left", x = 0 }]
 [[body]]
 name = "up"
+order = 1
 young = 97006.8181627533
 poisson = 0.3
 fix = [{ on = "up_left", x = 0 }]
@@ -154,11 +162,13 @@ layer = { table = [[4.190e-6, 5.43416058], [10, 5.43450102458]] }
                 elements: [12, 6, 6, 3],
                 scene: r#"[[body]]
 name = "lo"
+order = 1
 young = 69893.8089457831
 poisson = 0.3
 fix = [{ on = "lo_bottom", y = 0 }, { on = "lo_left", x = 0 }]
 [[body]]
 name = "up"
+order = 1
 young = 561.9440542101815
 poisson = 0.3
 fix = [{ on = "up_left", x = 0 }]

@@ -36,7 +36,7 @@ fn prescribed_displacements_are_scaled_and_gaps_are_not() {
     let geo = concat!(env!("CARGO_MANIFEST_DIR"), "/meshes/stack/stack.geo");
     let block = |name: &str, fix: &str| {
         format!(
-            "[[body]]\nname = \"{name}\"\nyoung = 100\npoisson = 0\nfix = [{fix}, {{ on = \"{name}_left\", x = 0 }}]\n"
+            "[[body]]\nname = \"{name}\"\norder = 1\nyoung = 100\npoisson = 0\nfix = [{fix}, {{ on = \"{name}_left\", x = 0 }}]\n"
         )
     };
     let text = format!(

@@ -2,6 +2,7 @@
 
 use crate::commands::interpolate::{EXACT, PointTree, Squares, mean};
 use crate::error::{Error, Kind, Result};
+use crate::linalg::{bounds, length, minus};
 use crate::scene::Scene;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
@@ -65,10 +66,63 @@ pub(super) fn difference(run: &[PairPoints], reference: &[PairPoints]) -> Option
     let known = |own: &PairPoints| -> Option<Vec<f64>> {
         // tables of the same pair, or the only two
         let other = reference.iter().find(|other| other.name == own.name || reference.len() == 1)?;
-        let scattered = PointTree::new(&other.at);
-        Some(own.at.iter().map(|x| mean(&scattered.plane(x, EXACT), &other.pressure)).collect())
+        let known = Known::of(other);
+        Some(own.at.iter().map(|&x| known.at(x)).collect())
     };
     relative(run, &run.iter().map(known).collect::<Option<Vec<_>>>()?)
+}
+
+/// The pressures of a reference, known between its points on both sides of the end of contact.
+///
+/// Pressures of closed points continue a smooth function, those of open points are zero, and there is a kink between
+/// them. Near the end of contact the pressure is that of the closed points alone, or zero beyond its zero.
+struct Known {
+    /// Whether each coordinate varies on the reference. A plane reference has none along the thickness of a slice of
+    /// space, where all its points would be about as near.
+    varies: [bool; 3],
+    all: PointTree,
+    is_open: Vec<bool>,
+    closed: PointTree,
+    /// Pressures of the closed points.
+    pressures: Vec<f64>,
+}
+
+impl Known {
+    fn of(reference: &PairPoints) -> Self {
+        let [low, high] = bounds(reference.at.iter().copied());
+        let extent = minus(high, low);
+        let varies = extent.map(|size| size > FLAT * length(extent));
+        let at: Vec<[f64; 3]> = reference.at.iter().map(|&x| along(varies, x)).collect();
+        let is_open: Vec<bool> = reference.pressure.iter().map(|pressure| *pressure == 0.0).collect();
+        let closed: Vec<usize> = (0..at.len()).filter(|&q| !is_open[q]).collect();
+        Self {
+            varies,
+            closed: PointTree::new(&closed.iter().map(|&q| at[q]).collect::<Vec<_>>()),
+            pressures: closed.iter().map(|&q| reference.pressure[q]).collect(),
+            all: PointTree::new(&at),
+            is_open,
+        }
+    }
+
+    fn at(&self, x: [f64; 3]) -> f64 {
+        let x = along(self.varies, x);
+        let nearest = self.all.plane(&x, EXACT);
+        let open = nearest.iter().filter(|(q, _)| self.is_open[*q]).count();
+        if open == nearest.len() {
+            return 0.0;
+        }
+        let pressure = mean(&self.closed.plane(&x, EXACT), &self.pressures);
+        // a bond, which also pulls, has no open points
+        if open == 0 { pressure } else { pressure.max(0.0) }
+    }
+}
+
+/// Extent of a reference along an axis, relative to its size, up to which it does not vary there: rounding of tables.
+const FLAT: f64 = 1e-9;
+
+/// Return a point without the coordinates that do not vary.
+fn along(varies: [bool; 3], x: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|c| if varies[c] { x[c] } else { 0.0 })
 }
 
 /// Return the relative error in L2 of the pressures of a run against the `reference` of its contact; `None` without
@@ -111,6 +165,20 @@ mod tests {
             let error = |run: PairPoints| difference(&[run], std::slice::from_ref(&reference)).expect("an error");
             let off = points(run.at.clone(), |x| 1.01 * p(x));
             assert!(error(run) < 1e-9 && (error(off) - 0.01).abs() < 1e-9);
+        }
+    }
+
+    /// The pressure of a linear layer ends with a kink between two points of the reference, on a curve, which is also
+    /// that of a slice of space, and on a surface.
+    #[test]
+    fn the_end_of_contact_is_met() {
+        let p = |x: &[f64; 3]| (2.03 - x[0]).max(0.0);
+        let curve = points((0..41).map(|k| [0.1 * f64::from(k), 1.0, 0.0]).collect(), p);
+        let grid = points((0..1681).map(|k| [0.1 * f64::from(k % 41), 0.1 * f64::from(k / 41), 2.0]).collect(), p);
+        let run = |y: f64, z: f64| points((0..80).map(|k| [0.047 * f64::from(k), y, z]).collect(), p);
+        for (run, reference) in [(run(1.0, 0.0), &curve), (run(1.0, 0.5), &curve), (run(1.33, 2.0), &grid)] {
+            let error = difference(&[run], std::slice::from_ref(reference)).expect("an error");
+            assert!(error < 1e-9, "{error}");
         }
     }
 }

@@ -4,7 +4,7 @@ use crate::commands::cases::{Axis, AxisValue, Case, Plan};
 use crate::commands::rows::Row;
 use crate::commands::{case_of, folder_of};
 use crate::error::{Error, Kind, Result};
-use crate::problem::{Order, Preset};
+use crate::problem::{MeshSource, Order, Preset};
 use crate::scene::Scene;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -154,10 +154,12 @@ fn names(scenes: &[Scene]) -> Vec<String> {
     scenes.iter().map(name).collect()
 }
 
-/// Return the element orders of a scene, joined by `+`.
+/// Return the element orders of a scene, joined by `+`; the order of a mesh file is not known.
 fn orders_of(scene: &Scene) -> String {
-    let orders: BTreeSet<Order> = scene.bodies.iter().map(|body| body.order).collect();
-    orders.iter().map(|order| order.degree().to_string()).collect::<Vec<_>>().join("+")
+    let default = matches!(scene.mesh, MeshSource::Geo(_)).then(Order::default);
+    let orders: BTreeSet<_> = scene.bodies.iter().map(|body| body.order.or(default)).collect();
+    let word = |order: Option<Order>| order.map_or("file".to_owned(), |order| order.degree().to_string());
+    orders.into_iter().map(word).collect::<Vec<_>>().join("+")
 }
 
 /// Return the solvers of `--solver`, or all presets if there is none.

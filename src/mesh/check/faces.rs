@@ -1,7 +1,7 @@
 //! The cells of one body, with nodes numbered within the body, and the check of their faces.
 
 use crate::error::{Error, Result};
-use crate::linalg::pad;
+use crate::linalg::{cross, length, minus, pad};
 use crate::mesh::faces::{Face, Faces, Simplices};
 use crate::mesh::{Group, Mesh};
 
@@ -70,6 +70,13 @@ impl<'a, const D: usize> Cells<'a, D> {
     /// Return the coordinates (x, y, z) of a node, z = 0 in the plane.
     pub fn at(&self, node: u32) -> [f64; 3] {
         pad(self.mesh.points[self.points[node as usize] as usize])
+    }
+
+    /// Return the area (length in the plane) of a face, from its corners.
+    pub fn area(&self, face: Face<D>) -> f64 {
+        let corners = face.corners().map(|i| self.at(self.cell(face.cell())[i]));
+        let edge = |k: usize| minus(corners[k], corners[0]);
+        if D == 2 { length(edge(1)) } else { length(cross(edge(1), edge(2))) / 2.0 }
     }
 
     /// Return the refusal of the body because of `what` is wrong with some of its cells, at the point `at`.

@@ -42,12 +42,14 @@ pub struct Asked<'a> {
 }
 
 /// Results of the check of a body.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct BodyCheck {
     /// Number of facets between two cells.
     pub inner: usize,
     /// Number of facets of the boundary.
     pub outer: usize,
+    /// Area (length in the plane) of the boundary, from its corners.
+    pub surface: f64,
     /// Parts of the body that are connected by facets.
     pub parts: Components,
     /// Point of the mesh of each node of the body.
@@ -87,13 +89,14 @@ impl<const D: usize> Mesh<D> {
             let outer: Vec<Face<D>> = faces.outer().collect();
             boundary::check(&cells, &outer)?;
             let parts = parts::of(&cells, &faces)?;
+            let surface = outer.iter().map(|face| cells.area(*face)).sum();
             for ((name, duty), group) in &mut in_use {
                 let served =
                     body.groups.contains(&(*name, *duty)) || contacts().any(|contact| contact == (*name, *duty));
                 group.compare(&cells, &faces, &node, !served);
             }
             cells.points.iter().for_each(|&point| node[point as usize] = NONE);
-            checked.push(BodyCheck { inner: faces.inner(), outer: outer.len(), parts, points: cells.points });
+            checked.push(BodyCheck { inner: faces.inner(), outer: outer.len(), surface, parts, points: cells.points });
         }
         in_use.values().try_for_each(|group| group.judge(self))?;
         Ok(checked)
