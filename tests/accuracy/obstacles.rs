@@ -372,7 +372,7 @@ fn obstacles_that_cannot_be() {
         ("force = -1", "a negative `force`"),
         ("preload = 1", "a preload of an obstacle"),
         ("approach = 1\nforce = 1", "both `approach` and `force`"),
-        ("path = \"a\"", "`path` without a force"),
+        ("path = \"a\"", "`path` without a table"),
         ("force = 1\npath = \"a\"", "`path` without a table"),
         ("distance = 1", "`distance` of an obstacle"),
         ("angle = 30", "`angle` of an obstacle"),
