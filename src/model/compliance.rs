@@ -21,7 +21,7 @@ use super::{Body, Field, Model};
 use crate::error::{Error, Kind, Result};
 use crate::exchange::{Exchange, broadcast};
 use crate::linalg::{axpy, dot};
-use crate::petsc::{cholesky, cholesky_solve};
+use crate::petsc::{cholesky, cholesky_inverse, cholesky_solve};
 use crate::solver::BodyCounts;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use std::rc::Rc;
@@ -48,15 +48,17 @@ pub struct ComplianceStep {
 }
 
 impl ComplianceStep {
-    /// Make the compliance of the bodies of a model, which have their K. The result is `None` for bodies on springs to
-    /// the ground, whose compliance has few digits of the strains if the springs are soft, and where some K is not
-    /// positive definite without its pins. Collective.
+    /// Make the compliance of the bodies of a model, which have their K. The result is `None` where it does not pay: for
+    /// one body, which has as many points as dofs. It is also `None` for bodies on springs to the ground, whose
+    /// compliance has few digits of the strains if the springs are soft, and where some K is not positive definite
+    /// without its pins. Collective.
     ///
     /// # Errors
     /// Failures of LAPACK.
     pub fn new(model: &Model) -> Result<Option<Self>> {
         let n = model.points();
-        let mut is_missing = [f64::from(u8::from(model.bodies.iter().any(|slot| slot.sprung.is_some())))];
+        let is_sprung = model.bodies.iter().any(|slot| slot.sprung.is_some());
+        let mut is_missing = [f64::from(u8::from(is_sprung || model.meshed() == 1))];
         let mut bodies: Vec<Option<PinnedStiffness>> = model.bodies.iter().map(|_| None).collect();
         let mut compliance = vec![0.0; n * n];
         for (index, body) in model.locals().filter(|(index, _)| !model.bodies[*index].is_rigid) {
@@ -64,7 +66,7 @@ impl ComplianceStep {
                 is_missing[0] += 1.0;
                 continue;
             };
-            pinned.add_compliance(body, &points_of_rows(model, index), n, &mut compliance)?;
+            pinned.add_compliance(body, &points_of_rows(model, index), n, &mut compliance);
             bodies[index] = Some(pinned);
         }
         model.exchange.sum(&mut is_missing);
@@ -118,7 +120,7 @@ impl ComplianceStep {
 
     /// Add to a state what is left of the equations. Collective.
     fn correct(&self, model: &Model, left: &ContactResidual, found: &mut ContactState) -> Result<()> {
-        let mut g = closing_of(model, &self.pinned_displacements(&left.forces)?);
+        let mut g = closing_of(model, &self.pinned_displacements(&left.forces));
         model.exchange.sum(&mut g);
         axpy(-1.0, &left.closing, &mut g);
         let (force, amounts) = self.equilibrium(&g, left.works.as_slice())?;
@@ -126,7 +128,7 @@ impl ComplianceStep {
         for (index, body) in model.locals().filter(|(index, _)| !model.bodies[*index].is_rigid) {
             body.dofs().rows.add_transpose(-1.0, &model.at_rows(index, &force), &mut rest[index]);
         }
-        let change = self.pinned_displacements(&rest)?;
+        let change = self.pinned_displacements(&rest);
         found.v.iter_mut().zip(&change).for_each(|(v, change)| axpy(1.0, change, v));
         axpy(1.0, &force, &mut found.force);
         found.amounts += DVector::from_vec(amounts);
@@ -134,10 +136,10 @@ impl ComplianceStep {
     }
 
     /// Return K^-1 r for forces on the dofs of each body that this rank has; zero for others.
-    fn pinned_displacements(&self, r: &[Vec<f64>]) -> Result<Vec<Vec<f64>>> {
+    fn pinned_displacements(&self, r: &[Vec<f64>]) -> Vec<Vec<f64>> {
         let of_body = |(body, r): (&Option<PinnedStiffness>, &Vec<f64>)| match body {
             Some(body) => body.solve(r),
-            None => Ok(vec![0.0; r.len()]),
+            None => vec![0.0; r.len()],
         };
         self.bodies.iter().zip(r).map(of_body).collect()
     }
@@ -186,12 +188,13 @@ impl LinearStep for ComplianceStep {
         let works = Motions::of(model).work_of(model, residual);
         let mut found = ContactState::zero(model, residual);
         let (forces, closing) = (residual.to_vec(), vec![0.0; model.points()]);
-        let mut left = ContactResidual { forces, closing, works: works.clone() };
-        for pass in 0..PASSES {
-            if pass > 0 {
-                left = found.left(model, springs, residual, &works);
-            }
+        let mut left = ContactResidual { forces, closing, works: works.clone(), share: 1.0 };
+        for _ in 0..PASSES {
             self.correct(model, &left, &mut found)?;
+            left = found.left(model, springs, residual, &works);
+            if left.share < ROUNDED {
+                break;
+            }
         }
         let ContactState { v, amounts, .. } = found;
         let own: f64 = v.iter().zip(residual).map(|(v, r)| dot(v, r)).sum();
@@ -213,10 +216,14 @@ impl LinearStep for ComplianceStep {
     }
 }
 
-/// Solves of a system: the second one takes out what rounding leaves of the first. F has the flexibility of a whole
-/// body in every entry, which is 1e6 times that of its surface where a beam is 100 times as long as thick, so that the
-/// first solve has six digits less than numbers have.
-const PASSES: usize = 2;
+/// Solves of a system: each takes out what rounding leaves of the one before. F has the flexibility of a whole body in
+/// every entry, which is 1e6 times that of its surface where a beam is 100 times as long as thick, so that the first
+/// solve has six digits less than numbers have.
+const PASSES: usize = 3;
+
+/// Share of the forces, or of the compressions by them, up to which what is left is rounding. The residual of a step by
+/// a factorisation is of this size.
+const ROUNDED: f64 = 1e-12;
 
 /// An iterate of the equations of the contact.
 struct ContactState {
@@ -236,6 +243,8 @@ struct ContactResidual {
     closing: Vec<f64>,
     /// E'r - (B E)'l.
     works: DVector<f64>,
+    /// Root mean square of the forces, over that of r, or of the closings, over that of D^-1 l; the larger one.
+    share: f64,
 }
 
 impl ContactState {
@@ -252,12 +261,20 @@ impl ContactState {
         forces.iter_mut().zip(r).for_each(|(left, r)| left.iter_mut().zip(r).for_each(|(left, r)| *left = r - *left));
         let motions = Motions::of(model);
         let mut closing = closing_of(model, &self.v);
+        let square = |all: &[Vec<f64>]| all.iter().map(|r| dot(r, r)).sum::<f64>();
+        closing.extend([square(&forces), square(r)]);
         model.exchange.sum(&mut closing);
+        let squares = closing.split_off(model.points());
         axpy(1.0, &motions.closing(&self.amounts), &mut closing);
-        for ((closing, force), spring) in closing.iter_mut().zip(&self.force).zip(springs) {
-            *closing = if has_spring(*spring) { force / spring - *closing } else { 0.0 };
+        let compression = |(force, spring): (&f64, &f64)| if has_spring(*spring) { force / spring } else { 0.0 };
+        let compressions: Vec<f64> = self.force.iter().zip(springs).map(compression).collect();
+        for ((closing, compression), spring) in closing.iter_mut().zip(&compressions).zip(springs) {
+            *closing = if has_spring(*spring) { compression - *closing } else { 0.0 };
         }
-        ContactResidual { forces, closing, works: works - motions.work(&self.force) }
+        let ratio = |left: f64, whole: f64| if left == 0.0 { 0.0 } else { (left / whole).sqrt() };
+        let share =
+            ratio(squares[0], squares[1]).max(ratio(dot(&closing, &closing), dot(&compressions, &compressions)));
+        ContactResidual { forces, closing, works: works - motions.work(&self.force), share }
     }
 }
 
@@ -289,49 +306,49 @@ fn closing_of(model: &Model, u: &[Vec<f64>]) -> Vec<f64> {
     closing
 }
 
-/// K of a body without its pins, factored.
+/// The inverse of K of a body without its pins.
 struct PinnedStiffness {
     count: usize,
     pins: Vec<usize>,
-    /// The factor of K with ones on the diagonal at the pins.
-    factor: Vec<f64>,
+    /// K^-1, with ones on the diagonal at the pins.
+    inverse: Vec<f64>,
 }
 
 impl PinnedStiffness {
-    /// Factor K of a body; `None` if K without pins is not positive definite.
+    /// Invert K of a body; `None` if K without pins is not positive definite.
     fn new(body: &Body) -> Result<Option<Self>> {
         let (stiffness, count) = (body.stiffness(), body.dofs().count);
         let pins = pins(&body.dofs().unconstrained_modes);
-        let mut factor = vec![0.0; count * count];
+        let mut inverse = vec![0.0; count * count];
         for i in (0..count).filter(|i| !pins.contains(i)) {
-            stiffness.row(i).filter(|(j, _)| !pins.contains(j)).for_each(|(j, k)| factor[i * count + j] = k);
+            stiffness.row(i).filter(|(j, _)| !pins.contains(j)).for_each(|(j, k)| inverse[i * count + j] = k);
         }
-        pins.iter().for_each(|&pin| factor[pin * count + pin] = 1.0);
-        Ok(cholesky(&mut factor, count)?.then_some(Self { count, pins, factor }))
+        pins.iter().for_each(|&pin| inverse[pin * count + pin] = 1.0);
+        if !cholesky(&mut inverse, count)? {
+            return Ok(None);
+        }
+        cholesky_inverse(&mut inverse, count)?;
+        Ok(Some(Self { count, pins, inverse }))
     }
 
     /// Return K^-1 r.
-    fn solve(&self, r: &[f64]) -> Result<Vec<f64>> {
-        let mut v = r.to_vec();
-        self.pins.iter().for_each(|&pin| v[pin] = 0.0);
-        cholesky_solve(&self.factor, self.count, &mut v)?;
-        Ok(v)
+    fn solve(&self, r: &[f64]) -> Vec<f64> {
+        let mut forces = r.to_vec();
+        self.pins.iter().for_each(|&pin| forces[pin] = 0.0);
+        self.inverse.chunks_exact(self.count.max(1)).map(|row| dot(row, &forces)).collect()
     }
 
     /// Add B K^-1 B' to F, n x n, for the contact rows of the body at these points.
-    fn add_compliance(&self, body: &Body, points: &[usize], n: usize, compliance: &mut [f64]) -> Result<()> {
+    fn add_compliance(&self, body: &Body, points: &[usize], n: usize, compliance: &mut [f64]) {
         let rows = &body.dofs().rows;
-        let mut moved = vec![0.0; self.count * rows.rows()];
-        for (q, column) in moved.chunks_exact_mut(self.count.max(1)).enumerate() {
-            rows.row(q).filter(|(i, _)| !self.pins.contains(i)).for_each(|(i, b)| column[i] = b);
-        }
-        cholesky_solve(&self.factor, self.count, &mut moved)?;
-        for (column, &q) in moved.chunks_exact(self.count.max(1)).zip(points) {
+        let free = |q: usize| rows.row(q).filter(|(i, _)| !self.pins.contains(i));
+        for (q, &own) in points.iter().enumerate() {
+            let mut column = vec![0.0; self.count];
+            free(q).for_each(|(i, b)| axpy(b, &self.inverse[i * self.count..][..self.count], &mut column));
             for (p, &point) in points.iter().enumerate() {
-                compliance[q * n + point] += rows.row(p).map(|(i, b)| b * column[i]).sum::<f64>();
+                compliance[own * n + point] += free(p).map(|(i, b)| b * column[i]).sum::<f64>();
             }
         }
-        Ok(())
     }
 }
 

@@ -5,7 +5,7 @@
 
 use super::call::fit;
 use super::error::{Error, Result};
-use super::ffi::{dpotrf_, dpotrs_};
+use super::ffi::{dpotrf_, dpotri_, dpotrs_};
 use std::ffi::{CStr, c_char, c_int, c_void};
 
 /// The triangle that holds the factor.
@@ -58,6 +58,31 @@ pub fn cholesky_solve(factor: &[f64], n: usize, x: &mut [f64]) -> Result<()> {
     let columns: c_int = fit("LAPACK", "right-hand sides", x.len() / n.max(1))?;
     // SAFETY: a factor of n x n numbers and right-hand sides of n.
     unsafe { dpotrs_(UPPER.as_ptr(), &rows, &columns, factor.as_ptr(), &lead, x.as_mut_ptr(), &lead, &mut info, 1) };
+    Ok(())
+}
+
+/// Turn a factor of [`cholesky`] into the inverse of the matrix, with both triangles (LAPACK's dpotri).
+///
+/// ```
+/// use winkler::petsc::{cholesky, cholesky_inverse};
+/// let mut g = [4.0, 2.0, 2.0, 5.0];
+/// assert!(cholesky(&mut g, 2)?);
+/// cholesky_inverse(&mut g, 2)?;
+/// assert!((g[0] - 0.3125).abs() < 1e-15 && (g[1] + 0.125).abs() < 1e-15 && g[1] == g[2]);
+/// # Ok::<(), winkler::error::Error>(())
+/// ```
+///
+/// # Errors
+/// When the slice does not have n^2 entries.
+pub fn cholesky_inverse(factor: &mut [f64], n: usize) -> Result<()> {
+    let (rows, lead, mut info) = (order(factor, n)?, order(factor, n)?.max(1), 0);
+    // SAFETY: a factor of n x n numbers.
+    unsafe { dpotri_(UPPER.as_ptr(), &rows, factor.as_mut_ptr(), &lead, &mut info, 1) };
+    for column in 0..n {
+        for row in 0..column {
+            factor[row * n + column] = factor[column * n + row];
+        }
+    }
     Ok(())
 }
 

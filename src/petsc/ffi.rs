@@ -27,6 +27,15 @@ unsafe extern "C" {
         info: *mut c_int,
         length: usize,
     );
+    /// Turn a factor of [`dpotrf_`] into the inverse of the matrix.
+    pub fn dpotri_(
+        part: *const c_char,
+        n: *const c_int,
+        a: *mut f64,
+        lda: *const c_int,
+        info: *mut c_int,
+        length: usize,
+    );
     /// Solve with a factor of [`dpotrf_`].
     pub fn dpotrs_(
         part: *const c_char,

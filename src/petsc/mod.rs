@@ -42,7 +42,7 @@ mod subspace;
 mod until;
 mod vector;
 
-pub use blas::{cholesky, cholesky_solve};
+pub use blas::{cholesky, cholesky_inverse, cholesky_solve};
 pub use error::Error;
 pub use ffi::Int;
 pub use ksp::{ConvergedReason, Ksp, Solved};

@@ -109,9 +109,12 @@ pub fn of_each(
         MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin => 1.2,
         _ => 7.0,
     };
-    let interfaces = bodies.iter().filter(|body| may_condense(body)).map(|body| body.interface);
-    let interface = if are_joined { interfaces.sum() } else { interfaces.max().unwrap_or(0) } as f64;
-    let dense = Cost { seconds: NEWTON_STEPS * interface.powi(3) / 3.0 / RATE, bytes: 36.0 * interface * interface };
+    let interfaces: Vec<usize> = bodies.iter().filter(|body| may_condense(body)).map(|body| body.interface).collect();
+    let dense = if are_joined && interfaces.len() > 1 {
+        of_compliance(&interfaces)
+    } else {
+        of_dense_steps(interfaces.iter().copied().max().unwrap_or(0))
+    };
     let sum = |of_body: &dyn Fn(&BodyFacts) -> Cost| bodies.iter().map(of_body).fold(Cost::default(), Cost::and);
     let in_each_step = |body: &BodyFacts| body.factored(0).times(NEWTON_STEPS * times);
     let condensed =
@@ -121,6 +124,26 @@ pub fn of_each(
         (Preset::Mumps, sum(&in_each_step)),
         (Preset::Hypre, sum(&|body| body.multigrid().times(times))),
     ]
+}
+
+/// Return the cost of the compliance at n contact points of several bodies with these interface dofs R, and of a
+/// factorisation of the points in each step. The inverse of each body takes R^3 operations. Both sides of a pair have
+/// about as many dofs along the normal as the pair has points.
+fn of_compliance(interfaces: &[usize]) -> Cost {
+    let each = || interfaces.iter().map(|&interface| interface as f64);
+    let points = 0.5 * each().sum::<f64>();
+    let inverses: f64 = each().map(|r| r.powi(3)).sum();
+    Cost {
+        seconds: (inverses + NEWTON_STEPS * points.powi(3) / 3.0) / RATE,
+        // S with its pattern and its inverse; the compliance and the factor of the points
+        bytes: 20.0 * each().map(|r| r * r).sum::<f64>() + 16.0 * points * points,
+    }
+}
+
+/// Return the cost of a dense factorisation of so many interface dofs in each step.
+fn of_dense_steps(interface: usize) -> Cost {
+    let r = interface as f64;
+    Cost { seconds: NEWTON_STEPS * r.powi(3) / 3.0 / RATE, bytes: 36.0 * r * r }
 }
 
 impl BodyFacts {
