@@ -21,8 +21,8 @@ const PRODUCT: f64 = 42.0 / 1e9;
 const FACTORED: f64 = 320.0;
 
 /// Time of multigrid over 1 + s in products with K, from its set-up to the last step of Newton's method, where s is the
-/// slenderness of a body. The scenes took 0.5 to 1.5 times as long, and a slice that cannot bend 0.3 times.
-const MULTIGRID: f64 = 480.0;
+/// slenderness of a body. The scenes took 0.5 to 1.5 times as long, and slices that cannot bend 0.2 to 0.5 times.
+const MULTIGRID: f64 = 720.0;
 
 /// Steps of Newton's method in a scene; those measured take 2 to 8, on the average 4.6.
 const NEWTON_STEPS: f64 = 5.0;
@@ -117,13 +117,23 @@ pub fn of_each(
     };
     let sum = |of_body: &dyn Fn(&BodyFacts) -> Cost| bodies.iter().map(of_body).fold(Cost::default(), Cost::and);
     let in_each_step = |body: &BodyFacts| body.factored(0).times(NEWTON_STEPS * times);
+    let factored = if are_joined { joined(bodies) } else { sum(&in_each_step) };
     let condensed =
         |body: &BodyFacts| if may_condense(body) { body.factored(body.interface) } else { in_each_step(body) };
     [
         (Preset::Condensed, dense.and(sum(&condensed))),
-        (Preset::Mumps, sum(&in_each_step)),
+        (Preset::Mumps, factored),
         (Preset::Hypre, sum(&|body| body.multigrid().times(times))),
     ]
+}
+
+/// Return the cost of a factorisation of all bodies as one in each step, with their mean slenderness. The springs of the
+/// contact couple them, so that the points between bodies are in the last front.
+fn joined(bodies: &[BodyFacts]) -> Cost {
+    let dofs: usize = bodies.iter().map(|body| body.dofs).sum();
+    let slenderness = bodies.iter().map(|body| body.dofs as f64 * body.slenderness).sum::<f64>() / dofs as f64;
+    let between: usize = if bodies.len() > 1 { bodies.iter().map(|body| body.interface).sum() } else { 0 };
+    BodyFacts { dofs, slenderness, ..BodyFacts::default() }.factored(between / 2).times(NEWTON_STEPS)
 }
 
 /// Return the cost of the compliance at n contact points of several bodies with these interface dofs R, and of a
