@@ -528,10 +528,13 @@ fn tetrahedra_are_by_hxt_where_it_is_steady() {
     let quadrangles =
         "Transfinite Curve{:} = 3;\nTransfinite Surface{:};\nRecombine Surface{:};\nTransfinite Volume{1};\n";
     let beside = format!("{cube}{quadrangles}");
+    // on several threads, HXT of Gmsh 4.8 now and then leaves a crack between two volumes
+    let single = cube.replace("{0, 0, 0, 1, 1, 1};\nBox(2) = {0, 0, 1, 1, 1, 1};\nCoherence;", "{0, 0, 0, 1, 1, 2};");
+    let single = single.replace("{1, 2};", "{1};");
     // the counter, the threads, and whether each call asks for HXT
     for (version, geo, threads, without, number, expected) in [
         ("4.11.1", cube, "", 1, 1, &[false][..]),
-        ("4.11.1", cube, ", threads = 2", 0, 2, &[true]),
+        ("4.11.1", &single, ", threads = 2", 0, 2, &[true]),
         ("4.12.0", cube, "", 0, 1, &[true]),
         ("4.12.0", cube, "", 0, 1, &[]),
         ("4.12.0", &beside, "", 1, 1, &[true, false]),
