@@ -189,11 +189,11 @@ impl LinearStep for ComplianceStep {
         let mut found = ContactState::zero(model, residual);
         let (forces, closing) = (residual.to_vec(), vec![0.0; model.points()]);
         let mut left = ContactResidual { forces, closing, works: works.clone(), share: 1.0 };
-        for _ in 0..PASSES {
+        for pass in 0..PASSES {
             let before = left.share;
             self.correct(model, &left, &mut found)?;
             left = found.left(model, springs, residual, &works);
-            if left.share < ROUNDED || left.share > 0.1 * before {
+            if left.share < ROUNDED || (pass > 0 && left.share > 0.1 * before) {
                 break;
             }
         }
