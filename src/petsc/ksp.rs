@@ -349,11 +349,11 @@ impl Ksp {
     ///
     /// ```
     /// use std::{cell::Cell, rc::Rc};
-    /// use winkler::{error::Result, petsc::{Ksp, Matrix, Session, Subspace}};
+    /// use winkler::petsc::{Error, Ksp, Matrix, Session, Subspace};
     /// /// The first unknown of diag(1e6, 2, 3), and how often it was solved.
     /// struct First(Rc<Cell<usize>>);
     /// impl Subspace for First {
-    ///     fn correct(&self, r: &[f64], z: &mut [f64]) -> Result<()> {
+    ///     fn correct(&self, r: &[f64], z: &mut [f64]) -> Result<(), Error> {
     ///         self.0.set(self.0.get() + 1);
     ///         z[0] = r[0] / 1e6;
     ///         Ok(())
