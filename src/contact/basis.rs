@@ -15,8 +15,8 @@ use nalgebra::{DMatrix, DVector};
 #[derive(Debug, Clone, PartialEq)]
 pub struct PressureBasis {
     order: Order,
-    /// Ends of the part of an edge, from 0 to 1 along it, of which phi are the shape functions; else those of the whole
-    /// facet.
+    /// Ends of a part of an edge, from 0 to 1 along it, if the functions phi are those of the part. Without it they are
+    /// those of the whole facet.
     part: Option<[f64; 2]>,
     /// C.
     functions: DMatrix<f64>,

@@ -26,7 +26,7 @@ pub fn bodies<const D: usize>(scene: &Scene, mesh: &Mesh<D>, lying: &[Vec<u32>])
     Ok(bodies)
 }
 
-/// Return the bodies of all tables, of which some stand for several bodies.
+/// Return the bodies of all tables. A table may stand for several bodies.
 fn members_of_all<const D: usize>(scene: &Scene, mesh: &Mesh<D>, lying: &[Vec<u32>]) -> Result<Vec<BodySpec>> {
     let (members, mut lying, mut bodies) = (members(scene, mesh)?, lying.iter(), Vec::new());
     for (table, names) in scene.bodies.iter().zip(&members) {

@@ -188,15 +188,11 @@ impl LinearStep for ComplianceStep {
         let works = Motions::of(model).work_of(model, residual);
         let mut found = ContactState::zero(model, residual);
         let (forces, closing) = (residual.to_vec(), vec![0.0; model.points()]);
-        let mut left = ContactResidual { forces, closing, works: works.clone(), share: 1.0 };
-        for pass in 0..PASSES {
-            let before = left.share;
-            self.correct(model, &left, &mut found)?;
-            left = found.left(model, springs, residual, &works);
-            if left.share < ROUNDED || (pass > 0 && left.share > 0.1 * before) {
-                break;
-            }
-        }
+        self.correct(model, &ContactResidual { forces, closing, works: works.clone() }, &mut found)?;
+        // F has the flexibility of a whole body in every entry. That is 1e6 times the flexibility of its surface where a
+        // beam is 100 times as long as thick, so that one solve has six digits less than numbers have.
+        let left = found.left(model, springs, residual, &works);
+        self.correct(model, &left, &mut found)?;
         let ContactState { v, amounts, .. } = found;
         let own: f64 = v.iter().zip(residual).map(|(v, r)| dot(v, r)).sum();
         let (field, sums) = Field::of_step(model, v, &Motions::of(model).of_bodies(&amounts), &[own]);
@@ -217,16 +213,6 @@ impl LinearStep for ComplianceStep {
     }
 }
 
-/// Solves of a system: each takes out what rounding leaves of the one before. F has the flexibility of a whole body in
-/// every entry, which is 1e6 times that of its surface where a beam is 100 times as long as thick, so that the first
-/// solve has six digits less than numbers have.
-const PASSES: usize = 3;
-
-/// Share of the forces, or of the compressions by them, up to which what is left is rounding. A factorisation of the
-/// matrix of all bodies leaves as much; the forces of a support that carries a body far are 1e7 times those of the
-/// contact.
-const ROUNDED: f64 = 10.0 * f64::EPSILON;
-
 /// An iterate of the equations of the contact.
 struct ContactState {
     /// v of each body that this rank has.
@@ -245,8 +231,6 @@ struct ContactResidual {
     closing: Vec<f64>,
     /// E'r - (B E)'l.
     works: DVector<f64>,
-    /// Root mean square of the forces, over that of r, or of the closings, over that of D^-1 l; the larger one.
-    share: f64,
 }
 
 impl ContactState {
@@ -263,20 +247,12 @@ impl ContactState {
         forces.iter_mut().zip(r).for_each(|(left, r)| left.iter_mut().zip(r).for_each(|(left, r)| *left = r - *left));
         let motions = Motions::of(model);
         let mut closing = closing_of(model, &self.v);
-        let square = |all: &[Vec<f64>]| all.iter().map(|r| dot(r, r)).sum::<f64>();
-        closing.extend([square(&forces), square(r)]);
         model.exchange.sum(&mut closing);
-        let squares = closing.split_off(model.points());
         axpy(1.0, &motions.closing(&self.amounts), &mut closing);
-        let compression = |(force, spring): (&f64, &f64)| if has_spring(*spring) { force / spring } else { 0.0 };
-        let compressions: Vec<f64> = self.force.iter().zip(springs).map(compression).collect();
-        for ((closing, compression), spring) in closing.iter_mut().zip(&compressions).zip(springs) {
-            *closing = if has_spring(*spring) { compression - *closing } else { 0.0 };
+        for ((closing, force), spring) in closing.iter_mut().zip(&self.force).zip(springs) {
+            *closing = if has_spring(*spring) { force / spring - *closing } else { 0.0 };
         }
-        let ratio = |left: f64, whole: f64| if left == 0.0 { 0.0 } else { (left / whole).sqrt() };
-        let share =
-            ratio(squares[0], squares[1]).max(ratio(dot(&closing, &closing), dot(&compressions, &compressions)));
-        ContactResidual { forces, closing, works: works - motions.work(&self.force), share }
+        ContactResidual { forces, closing, works: works - motions.work(&self.force) }
     }
 }
 

@@ -409,25 +409,7 @@ impl ContactSpec {
             let message = "an obstacle that turns in an axisymmetric scene";
             return Err(Fault::new(*key, message, "it moves along the axis alone", ""));
         }
-        for (key, fields) in &given {
-            // expressions are known in each load step
-            let is_constant = |field: &&Field| field.is_constant();
-            let values: Vec<f64> = fields.iter().flatten().filter(is_constant).map(self::number).collect();
-            if let Some(value) = values.iter().find(|value| !value.is_finite()) {
-                return Err(Fault::new(*key, format!("`{key}` is {value}"), "", ""));
-            }
-            let is_pull = *key == "preload" || *key == "force" && !self.bond;
-            if let Some(value) = values.first().filter(|value| is_pull && **value < 0.0) {
-                let help = &match *key {
-                    "preload" if self.bond => {
-                        format!("a preload of a bonded pair is a tension already: write {}", -value)
-                    }
-                    "preload" => "a preload > 0 presses".to_owned(),
-                    _ => "a force > 0 presses; only a bonded pair can be pulled".to_owned(),
-                };
-                return Err(Fault::new(*key, format!("a negative `{key}`"), "", help));
-            }
-        }
+        given.iter().try_for_each(|(key, fields)| self.check_sign(key, fields.iter().flatten()))?;
         let is_scaled = |field: &Field| field.is_constant() && !field.is_zero();
         if self.path.is_some() && of(&["approach", "force", "preload", "tilt", "moment"]).is_empty() {
             return Err(Fault::new("path", "`path` without a force or motion of this contact", "", ""));
@@ -437,6 +419,23 @@ impl ContactSpec {
             return Err(Fault::new("path", "`path` of an expression", "", help));
         }
         Ok(())
+    }
+
+    /// Check that the numbers of a key are finite, and that a force which can only press is not negative. Expressions
+    /// are known in each load step.
+    fn check_sign<'f>(&self, key: &'static str, fields: impl Iterator<Item = &'f Field>) -> Result<(), Fault> {
+        let values: Vec<f64> = fields.filter(|field| field.is_constant()).map(self::number).collect();
+        if let Some(value) = values.iter().find(|value| !value.is_finite()) {
+            return Err(Fault::new(key, format!("`{key}` is {value}"), "", ""));
+        }
+        let is_pull = key == "preload" || key == "force" && !self.bond;
+        let Some(value) = values.first().filter(|value| is_pull && **value < 0.0) else { return Ok(()) };
+        let help = match key {
+            "preload" if self.bond => format!("a preload of a bonded pair is a tension already: write {}", -value),
+            "preload" => "a preload > 0 presses".to_owned(),
+            _ => "a force > 0 presses; only a bonded pair can be pulled".to_owned(),
+        };
+        Err(Fault::new(key, format!("a negative `{key}`"), "", &help))
     }
 
     /// Check a pair of surfaces: two plain names.

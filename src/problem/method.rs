@@ -308,7 +308,7 @@ pub struct StopRule {
     pub iterations: usize,
 }
 
-/// Tolerance of the residual without a rule.
+/// Tolerance of the residual without a rule: half of the digits of a double, which tables of eight digits show.
 const TOLERANCE: f64 = 1e-8;
 
 fn iterations() -> usize {

@@ -294,7 +294,7 @@ impl JsonSchema for Field {
     }
 }
 
-/// A vector: three components, of which the third is zero in the plane. One that was made in Rust is also written with
+/// A vector: three components, the third one zero in the plane. One that was made in Rust is also written with
 /// three.
 #[derive(Debug, Clone, PartialEq, JsonSchema)]
 #[schemars(with = "Vec<Field>")]

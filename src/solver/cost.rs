@@ -21,7 +21,8 @@ const PRODUCT: f64 = 42.0 / 1e9;
 const FACTORED: f64 = 320.0;
 
 /// Time of multigrid over 1 + s in products with K, from its set-up to the last step of Newton's method, where s is the
-/// slenderness of a body. The scenes took 0.5 to 1.5 times as long, and slices that cannot bend 0.2 to 0.5 times.
+/// slenderness of a body. With it each scene of docs/solvers.md gets a solver that takes at most 1.1 times as long as the
+/// fastest. Multigrid itself took 0.5 to 1.5 times as long, and 0.2 to 0.5 times on slices that cannot bend.
 const MULTIGRID: f64 = 720.0;
 
 /// Steps of Newton's method in a scene; those measured take 2 to 8, on the average 4.6.
