@@ -193,7 +193,7 @@ impl Discrete {
         let model = &mut self.model;
         model.pairs[i].offset = offset;
         for slot in model.bodies.iter_mut().filter(|slot| slot.is_rigid && slot.segments[0].pair == i) {
-            (slot.local, slot.motions) = (None, Vec::new());
+            (slot.local, slot.motions, slot.free) = (None, Vec::new(), 0);
         }
         model.set_gaps();
     }

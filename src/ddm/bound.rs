@@ -228,10 +228,10 @@ impl Scale {
     pub fn imbalance(&self, model: &Model, force: &[f64], strain: f64) -> f64 {
         let mut most = 0.0f64;
         let least = self.area * self.pressure(strain);
-        for (body, slot) in model.bodies.iter().enumerate().filter(|(_, slot)| !slot.motions.is_empty()) {
+        for (body, slot) in model.bodies.iter().enumerate().filter(|(_, slot)| slot.free > 0) {
             let force = model.at_rows(body, force);
             let total = least.max(force.iter().map(|force| force.abs()).sum());
-            for motion in &slot.motions {
+            for motion in slot.free_motions() {
                 let arm = motion.trace.iter().fold(0.0f64, |max, m| max.max(m.abs()));
                 let lacking = (motion.work - dot(&force, &motion.trace)).abs();
                 if lacking > 0.0 {

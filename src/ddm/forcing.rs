@@ -93,7 +93,7 @@ pub fn respond(
 ) -> Result<Solved<(Field, f64)>> {
     let (mut residual, mut work) = (Vec::new(), [0.0]);
     for (slot, load) in model.bodies.iter_mut().zip(loads) {
-        let count = if slot.is_rigid { slot.local.as_ref().map_or(0, |_| slot.motions.len()) } else { 0 };
+        let count = if slot.is_rigid { slot.local.as_ref().map_or(0, |_| slot.free) } else { 0 };
         if count > 0 {
             residual.push(vec![0.0; count]);
             continue;

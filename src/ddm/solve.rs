@@ -148,9 +148,9 @@ impl Run<'_> {
     /// Return the amounts of the free motions of each body in a start. Bodies on springs begin at rest, since springs
     /// resist some of the motions of the start.
     fn motions_of(&self, amounts: &DVector<f64>) -> Vec<Vec<f64>> {
-        let mut amounts = Motions::with_springs(self.model).of_bodies(amounts);
-        for (amounts, slot) in amounts.iter_mut().zip(&self.model.bodies).filter(|(_, slot)| slot.sprung.is_some()) {
-            *amounts = vec![0.0; slot.motions.len()];
+        let mut amounts = Motions::all(self.model).of_bodies(amounts);
+        for (amounts, slot) in amounts.iter_mut().zip(&self.model.bodies).filter(|(_, slot)| slot.is_sprung()) {
+            *amounts = vec![0.0; slot.free];
         }
         amounts
     }

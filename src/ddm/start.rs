@@ -57,7 +57,7 @@ pub(super) const SEARCH: f64 = 1e-3;
 /// # Errors
 /// The bodies and their motions along which the energy falls for ever, if there are such motions.
 pub fn find(model: &Model, given: Option<&[f64]>) -> Result<RigidStart, Vec<NamedMotion>> {
-    let motions = Motions::with_springs(model);
+    let motions = Motions::all(model);
     let given = given.map_or_else(|| model.imposed(), <[f64]>::to_vec);
     let gap = model.compression(&given).into_iter().map(|c| -c).collect();
     let (work, slope) = (motions.loads(), surface_slopes(model));

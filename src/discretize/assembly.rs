@@ -107,7 +107,7 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
     /// rows.
     fn assemble(&mut self, part: &mut SceneBody<D>, load: Vec<f64>, slot: &mut BodySlot) -> Result<()> {
         let prescribed = part.mesh.prescribed();
-        let modes = part.mesh.unconstrained_modes.iter();
+        let modes = part.mesh.free_motions().iter();
         let mut unconstrained_modes: Vec<Vec<f64>> = modes.map(|motion| part.mesh.dofs_of(motion)).collect();
         unconstrained_modes.iter_mut().for_each(|motion| prescribed.iter().for_each(|entry| motion[entry.0] = 0.0));
         part.mesh.graph();

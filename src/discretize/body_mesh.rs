@@ -6,7 +6,7 @@ use super::supports::Constraints;
 use crate::exchange::Plain;
 use crate::fem::interpolation::{coarse_nodes, from_vertices};
 use crate::fem::{NodalBlock, NodalForces, NodeGraph, PointExtent, Prolongation, RigidMotion, Space, rigid};
-use crate::linalg::{Blocks, Csr, dot};
+use crate::linalg::{Blocks, Csr, TOLERANCE, dot};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use std::cell::OnceCell;
@@ -38,10 +38,10 @@ pub struct BodyMesh<const D: usize> {
     /// Nodal forces of the loads without those on rigid surfaces. On a part they are those at owned nodes, and at nodes
     /// tied to these.
     pub load: NodalForces<D>,
-    /// Rigid motions that supports and springs leave.
-    pub unconstrained_modes: Vec<RigidMotion<D>>,
-    /// Rigid motions that supports alone leave.
-    pub unsupported_modes: Vec<RigidMotion<D>>,
+    /// Rigid motions that supports leave. First come the free ones, which springs leave, too.
+    pub motions: Vec<RigidMotion<D>>,
+    /// Number of the free motions.
+    pub free: usize,
     /// Dofs of this rank, if the body is distributed.
     pub owned: Option<OwnedDofs>,
     /// Whether this rank owns the body or nodes of it. Other ranks have it for estimates of the error.
@@ -83,14 +83,18 @@ impl<const D: usize> BodyMesh<D> {
         self.at_dofs(motion, (dof / D) as u32)[dof % D]
     }
 
-    /// Return the products of the rigid motions that supports and springs leave, over all dofs without the prescribed
-    /// ones.
+    /// Return the motions that neither supports nor springs constrain.
+    pub fn free_motions(&self) -> &[RigidMotion<D>] {
+        &self.motions[..self.free]
+    }
+
+    /// Return the products of the free motions over all dofs without the prescribed ones.
     pub fn products(&self) -> DMatrix<f64> {
-        let (count, mut held) = (self.unconstrained_modes.len(), self.held.prescribed.keys().copied().peekable());
+        let (count, mut held) = (self.free, self.held.prescribed.keys().copied().peekable());
         let mut products = DMatrix::zeros(count, count);
         for node in 0..self.space.nodes.len() {
             let mut at: Vec<[f64; D]> =
-                self.unconstrained_modes.iter().map(|motion| self.at_dofs(motion, node as u32)).collect();
+                self.free_motions().iter().map(|motion| self.at_dofs(motion, node as u32)).collect();
             while let Some(dof) = held.next_if(|dof| dof / D <= node) {
                 at.iter_mut().filter(|_| dof / D == node).for_each(|u| u[dof % D] = 0.0);
             }
@@ -111,9 +115,10 @@ impl<const D: usize> BodyMesh<D> {
         self.held.prescribed.iter().map(|(&dof, &value)| (dof, value)).collect()
     }
 
-    /// Return the combination of the `rigid_modes` that comes nearest to the prescribed displacements in the sum of
-    /// squares. Its part along motions that supports leave is zero.
-    pub fn imposed_motion(&self, rigid_modes: &[RigidMotion<D>]) -> RigidMotion<D> {
+    /// Return the rigid motion that comes nearest to the prescribed displacements in the sum of squares. Its part along
+    /// motions that supports leave is zero.
+    pub fn imposed_motion(&self) -> RigidMotion<D> {
+        let rigid_modes = self.rigid_modes();
         let mut squares = DMatrix::zeros(rigid_modes.len(), rigid_modes.len());
         let mut work = DVector::zeros(rigid_modes.len());
         for (&dof, &value) in &self.held.prescribed {
@@ -122,14 +127,21 @@ impl<const D: usize> BodyMesh<D> {
             squares.ger(1.0, &at, &at, 1.0);
             work.axpy(value, &at, 1.0);
         }
-        rigid::sum(rigid_modes, &Blocks::single(&squares).factor().solve(&work))
+        rigid::sum(&rigid_modes, &Blocks::single(&squares).factor().solve(&work))
     }
 
-    /// Return the combinations of the `rigid_modes` that supports leave.
-    pub fn unsupported(&self, rigid_modes: &[RigidMotion<D>]) -> Vec<RigidMotion<D>> {
-        let left =
-            rigid::left_by_supports(rigid_modes.len(), |k, dof| self.dof_of(&rigid_modes[k], dof), &self.prescribed());
-        left.iter().map(|weights| rigid::combine(rigid_modes, weights)).collect()
+    /// Find the motions that supports leave at present, the free ones first.
+    pub fn find_motions(&mut self) {
+        let all = self.rigid_modes();
+        let left = rigid::left_by_supports(all.len(), |k, dof| self.dof_of(&all[k], dof), &self.prescribed());
+        self.motions = left.iter().map(|weights| rigid::combine(&all, weights)).collect();
+        let scale = self.ground_stiffness(&all).diagonal().max();
+        self.free = self.motions.len();
+        if scale > 0.0 && self.free > 0 {
+            let free = Blocks::free(&self.ground_stiffness(&self.motions), scale, TOLERANCE);
+            self.free = free.len();
+            self.motions = rigid::completed(&self.motions, &free);
+        }
     }
 
     /// Return the stiffness of the springs to the ground in terms of motions; zero without springs.

@@ -4,10 +4,12 @@ use super::post::Post;
 use super::whole_body::WholeBody;
 use crate::contact::ContactPair;
 use crate::fem;
-use crate::linalg::dot;
+use crate::linalg::{Blocks, TOLERANCE, dot};
 use crate::mesh::BodyCheck;
-use crate::model::BodySlot;
+use crate::model::motions::combined;
+use crate::model::{BodySlot, Motion};
 use crate::problem::{Order, Plane};
+use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use std::rc::Rc;
 
@@ -74,19 +76,21 @@ impl<const D: usize> WholeBody<'_, D> {
             local: None,
             is_rigid: false,
             segments: self.segments.clone(),
-            motions: self.motions.clone(),
-            sprung: self.sprung.clone(),
+            motions: self.motions(),
+            ground: self.part.mesh.ground_stiffness(&self.part.mesh.motions),
+            free: self.part.mesh.free,
             scale: 0.0,
             modulus,
             depth,
             row_stiffness: Vec::new(),
-            imposed: self.trace(&self.part.mesh.imposed_motion(&self.rigid_modes)),
+            imposed: self.trace(&self.part.mesh.imposed_motion()),
         };
-        (slot, self.info(checked, plane))
+        let info = self.info(checked, plane, unresisted(slot.free_motions()));
+        (slot, info)
     }
 
-    fn info(&self, checked: &BodyCheck, plane: Plane) -> BodyInfo {
-        let (part, unresisted) = (&self.part, self.unresisted());
+    fn info(&self, checked: &BodyCheck, plane: Plane, unresisted: Vec<String>) -> BodyInfo {
+        let part = &self.part;
         let spec = part.spec;
         BodyInfo {
             name: spec.name.value.clone(),
@@ -98,7 +102,7 @@ impl<const D: usize> WholeBody<'_, D> {
             order: part.mesh.space.order,
             dofs: part.mesh.space.dofs(),
             supported: part.mesh.held.supported(),
-            unconstrained: part.mesh.unconstrained_modes.iter().map(|motion| motion.name.clone()).collect(),
+            unconstrained: part.mesh.free_motions().iter().map(|motion| motion.name.clone()).collect(),
             unresisted,
             warning: part.locking(plane),
             rank: self.owner,
@@ -109,6 +113,15 @@ impl<const D: usize> WholeBody<'_, D> {
             post: None,
         }
     }
+}
+
+/// Return the names of the combinations of the free motions of a body that none of its contact rows resists.
+fn unresisted(motions: &[Motion]) -> Vec<String> {
+    let resisted = DMatrix::from_fn(motions.len(), motions.len(), |i, j| dot(&motions[i].trace, &motions[j].trace));
+    let rows = motions.first().map_or(1, |motion| motion.trace.len().max(1));
+    let names = || motions.iter().map(|motion| motion.name.as_str());
+    let named = |weights: DVector<f64>| combined(names(), weights.iter().copied());
+    Blocks::free(&resisted, rows as f64, TOLERANCE).into_iter().map(named).collect()
 }
 
 /// Return the mean squared components of the normals on the contact surfaces of a body.

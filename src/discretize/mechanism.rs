@@ -11,9 +11,11 @@
 //! If the loads do work on it, there is no solution, and the run reports this. Loads that balance on the true surfaces
 //! may lack balance on facets, and by quadrature. A small imbalance is taken from the loads, with a warning.
 
+use super::body_mesh::BodyMesh;
 use super::whole_body::{NO_WORK, WholeBody};
 use crate::contact::ContactPair;
 use crate::error::{few, joined};
+use crate::fem::balance::{Balance, balanced};
 use crate::fem::{PointExtent, RigidMotion, length, minus, rigid, unit};
 use crate::linalg::{Blocks, DisjointSets, PART, TOLERANCE, axpy, dot, fit};
 use crate::model::Mechanism;
@@ -55,6 +57,14 @@ struct GroupMotion<const D: usize> {
     amounts: DVector<f64>,
 }
 
+/// The motion of several bodies that is nearest to one of them as one.
+struct NearMotion {
+    /// The amounts of the motions of all bodies.
+    amounts: DVector<f64>,
+    /// What the displacements of the corners of the boxes around the bodies lack.
+    off: Vec<f64>,
+}
+
 struct MechanismSearch<'p, 's, const D: usize> {
     bodies: &'p mut [WholeBody<'s, D>],
     pairs: &'p mut [ContactPair],
@@ -71,7 +81,7 @@ struct MechanismSearch<'p, 's, const D: usize> {
 impl<const D: usize> MechanismSearch<'_, '_, D> {
     /// Return the motions that supports and springs leave to a body at present.
     fn unconstrained(&self, body: usize) -> &[RigidMotion<D>] {
-        &self.bodies[body].part.mesh.unconstrained_modes
+        self.bodies[body].part.mesh.free_motions()
     }
 
     fn extent(&self, body: usize) -> &PointExtent {
@@ -106,25 +116,26 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
 
     /// Return the motions of a group as one body that the supports of its bodies leave.
     fn as_one(&self, group: &[usize]) -> Vec<DVector<f64>> {
-        let all = self.common(group);
-        let mut held = DMatrix::zeros(all.len(), all.len());
-        let mut amounts = vec![DVector::zeros(self.count()); all.len()];
-        for &body in group {
-            let left: Vec<Vec<f64>> =
-                self.unconstrained(body).iter().map(|motion| self.at_corners(body, motion)).collect();
-            let mut off = Vec::new();
-            for (motion, amounts) in all.iter().zip(&mut amounts) {
-                let mut rest = self.at_corners(body, motion);
-                let own = fit(&left, &rest);
-                own.iter().zip(&left).for_each(|(&a, motion)| axpy(-a, motion, &mut rest));
-                amounts.as_mut_slice()[self.first(body)..][..own.len()].copy_from_slice(&own);
-                off.push(rest);
-            }
-            held += DMatrix::from_fn(all.len(), all.len(), |i, j| dot(&off[i], &off[j]) / off[i].len() as f64);
-        }
-        let free = Blocks::free(&held, 1.0, TOLERANCE);
-        let sum = |weights: DVector<f64>| weights.iter().zip(&amounts).map(|(w, amounts)| *w * amounts).sum();
+        let near: Vec<NearMotion> = self.common(group).iter().map(|motion| self.near(group, motion)).collect();
+        let displacements = near.first().map_or(1, |motion| motion.off.len() / group.len());
+        let held = DMatrix::from_fn(near.len(), near.len(), |i, j| dot(&near[i].off, &near[j].off));
+        let free = Blocks::free(&(held / displacements as f64), 1.0, TOLERANCE);
+        let sum = |weights: DVector<f64>| weights.iter().zip(&near).map(|(w, motion)| *w * &motion.amounts).sum();
         free.into_iter().map(sum).collect()
+    }
+
+    /// Return what comes nearest to a motion of several bodies as one among the motions that supports leave.
+    fn near(&self, bodies: &[usize], motion: &RigidMotion<D>) -> NearMotion {
+        let (mut amounts, mut off) = (DVector::zeros(self.count()), Vec::new());
+        for &body in bodies {
+            let left: Vec<Vec<f64>> = self.unconstrained(body).iter().map(|own| self.at_corners(body, own)).collect();
+            let mut rest = self.at_corners(body, motion);
+            let own = fit(&left, &rest);
+            own.iter().zip(&left).for_each(|(&a, motion)| axpy(-a, motion, &mut rest));
+            amounts.as_mut_slice()[self.first(body)..][..own.len()].copy_from_slice(&own);
+            off.extend(rest);
+        }
+        NearMotion { amounts, off }
     }
 
     /// Return the number of all motions.
@@ -157,8 +168,8 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
             let doubt = DOUBT * products(leaning) + self.tolerance() * all.tr_mul(&all);
             let of_all = |weights: DVector<f64>| &all * weights;
             let found = less(&products(closing), doubt).map(|few| few.into_iter().map(of_all).collect());
-            let works = self.bodies.iter().flat_map(|body| body.motions.iter().map(|motion| motion.work));
-            let loads = DVector::from_vec(works.collect());
+            let works = |body: usize| self.unconstrained(body).iter().map(move |motion| self.bodies[body].work(motion));
+            let loads = DVector::from_vec((0..self.bodies.len()).flat_map(works).collect());
             let yielding = held.solve(&loads);
             let found = squares.rounded(found.unwrap_or(doubtful));
             free.extend(found.into_iter().map(|motion| {
@@ -230,7 +241,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
         }
         for (_, body) in self.bodies.iter_mut().enumerate().filter(|(number, _)| turned.contains(number)) {
             body.collect_rows(self.pairs);
-            body.find_motions();
+            body.part.mesh.find_motions();
         }
     }
 
@@ -309,7 +320,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
             named.iter().map(|set| set.iter().map(|(_, moving)| self.work(moving).abs()).collect()).collect();
         let worst = works.iter().flatten().copied().fold(0.0, f64::max);
         if worst <= self.lack {
-            self.balance(named.iter().flatten().map(|(_, moving)| moving).collect());
+            self.balance(&named.iter().flatten().map(|(_, moving)| moving).collect::<Vec<_>>());
         }
         let mut pins = Vec::new();
         for (set, works) in named.into_iter().zip(works) {
@@ -336,7 +347,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
             }
             self.found.push(mechanism);
         }
-        self.bodies.iter_mut().for_each(WholeBody::find_motions);
+        self.bodies.iter_mut().for_each(|body| body.part.mesh.find_motions());
     }
 
     /// Return motions of the same bodies with their names. Where the bodies move as one, translations and rotations are
@@ -364,21 +375,10 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
         for (span, shift) in spans.iter_mut().zip(shifts) {
             let (_, amounts) = span;
             for c in (0..D).filter(|&c| shift[c] != 0.0) {
-                *amounts += shift[c] * self.as_group(bodies, &whole[c]);
+                *amounts += shift[c] * self.near(bodies, &whole[c]).amounts;
             }
         }
         spans.into_iter().map(|(motion, amounts)| (motion.in_words(), self.moving(amounts))).collect()
-    }
-
-    /// Return the amounts of one motion of several bodies, as near as the motions that supports leave come to it.
-    fn as_group(&self, bodies: &[usize], motion: &RigidMotion<D>) -> DVector<f64> {
-        let mut amounts = DVector::zeros(self.count());
-        for &body in bodies {
-            let left: Vec<Vec<f64>> = self.unconstrained(body).iter().map(|own| self.at_corners(body, own)).collect();
-            let own = fit(&left, &self.at_corners(body, motion));
-            amounts.as_mut_slice()[self.first(body)..][..own.len()].copy_from_slice(&own);
-        }
-        amounts
     }
 
     /// Return the name of a motion of several bodies, each of which has its own.
@@ -397,47 +397,29 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
         if work.abs() <= largest * NO_WORK { 0.0 } else { work / largest }
     }
 
-    /// Change the loads so that they do no work on any of these motions m_j. `works` holds the works w_j that the loads
-    /// do on them.
-    ///
-    /// Each nodal force f changes along the motions in proportion to its magnitude, by -|f| sum_j b_j m_j at its node.
-    /// The amounts b_j solve
-    ///
-    /// ```text
-    /// sum_k G_jk b_k = w_j,      G_jk = sum_nodes |f| m_j . m_k,
-    /// ```
-    ///
-    /// so that nodes with equal loads get equal corrections. Forces on rigid surfaces do not change.
-    fn balance(&mut self, all: Vec<&GroupMotion<D>>) {
-        let works: Vec<f64> = all.iter().map(|moving| moving.works(self.bodies)[0]).collect();
+    /// Change the loads so that they do no work on any of these motions ([`Balance`]). Forces on rigid surfaces do not
+    /// change.
+    fn balance(&mut self, all: &[&GroupMotion<D>]) {
         if all.iter().all(|moving| self.work(moving) == 0.0) {
             return;
         }
-        let mut products = DMatrix::zeros(all.len(), all.len());
-        for (number, body) in self.bodies.iter().enumerate() {
-            let motions: Vec<(usize, &RigidMotion<D>)> =
-                all.iter().enumerate().filter_map(|(j, moving)| Some((j, moving.of(number)?))).collect();
-            for (node, force) in body.part.mesh.load.iter().filter(|_| !motions.is_empty()) {
-                let size = dot(&force, &force).sqrt();
-                let at = motions.iter().map(|(j, motion)| (*j, motion.at(&body.part.mesh.space.nodes[node as usize])));
-                let at: Vec<(usize, [f64; D])> = at.collect();
-                for (j, u) in &at {
-                    at.iter().for_each(|(k, v)| products[(*j, *k)] += size * dot(u, v));
-                }
-            }
-        }
-        let largest = products.diagonal().max();
-        let Ok(amounts) = products.svd(true, true).solve(&DVector::from_vec(works), TOLERANCE * largest) else {
-            return;
+        let works = DVector::from_iterator(all.len(), all.iter().map(|moving| moving.works(self.bodies)[0]));
+        let of_body = |number: usize| -> Vec<(usize, &RigidMotion<D>)> {
+            all.iter().enumerate().filter_map(|(j, moving)| Some((j, moving.of(number)?))).collect()
         };
+        let moved = |mesh: &BodyMesh<D>, motions: &[(usize, &RigidMotion<D>)], node: u32| -> Vec<(usize, [f64; D])> {
+            motions.iter().map(|(j, motion)| (*j, mesh.at(motion, node))).collect()
+        };
+        let mut balance = Balance::new(all.len());
+        for (number, body) in self.bodies.iter().enumerate() {
+            let (mesh, motions) = (&body.part.mesh, of_body(number));
+            mesh.load.iter().for_each(|(node, force)| balance.add(force, &moved(mesh, &motions, node)));
+        }
+        let amounts = balance.amounts(&works);
         for (number, body) in self.bodies.iter_mut().enumerate() {
-            let motions: Vec<(f64, &RigidMotion<D>)> =
-                all.iter().zip(&amounts).filter_map(|(moving, amount)| Some((*amount, moving.of(number)?))).collect();
+            let motions = of_body(number);
             if !motions.is_empty() {
-                body.change_loads(|x| {
-                    let at = motions.iter().map(|(amount, motion)| motion.at(x).map(|u| amount * u));
-                    at.fold([0.0; D], |sum, u| std::array::from_fn(|c| sum[c] + u[c]))
-                });
+                body.change_loads(|mesh, node, force| balanced(force, &moved(mesh, &motions, node), &amounts));
             }
         }
     }

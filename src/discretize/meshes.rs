@@ -95,17 +95,12 @@ impl<const D: usize> KeptMeshes<D> {
     /// Return the displacements of all nodes of a body in the rigid motions that its supports leave, with these
     /// amounts.
     pub fn moved(&self, body: usize, amounts: &[f64]) -> Vec<f64> {
-        let BodyMesh { space, unsupported_modes, .. } = &self.shapes[body].mesh;
+        let BodyMesh { space, motions, .. } = &self.shapes[body].mesh;
         let mut moved = vec![0.0; space.dofs()];
-        for (motion, amount) in unsupported_modes.iter().zip(amounts) {
+        for (motion, amount) in motions.iter().zip(amounts) {
             axpy(*amount, &motion.nodal(space.nodes.iter().copied()), &mut moved);
         }
         moved
-    }
-
-    /// Return the magnitude of the nodal force at each entry of `load`, which holds forces at nodes.
-    pub fn sizes(&self, load: &[f64]) -> Vec<f64> {
-        load.chunks_exact(D).flat_map(|force| [dot(force, force).sqrt(); D]).collect()
     }
 
     /// Return the outer normal displacement at the integration points of a side of a pair, for displacements `u` of all

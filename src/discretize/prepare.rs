@@ -158,8 +158,9 @@ fn plan<const D: usize, F: Factory>(
     factory: &mut F,
     is_kept: &mut [bool],
 ) -> Result<F::SolverPlan> {
-    let of_body = |(WholeBody { part, rigid_modes, .. }, checked): (&WholeBody<D>, &BodyCheck)| {
+    let of_body = |(WholeBody { part, .. }, checked): (&WholeBody<D>, &BodyCheck)| {
         let (spec, mesh) = (part.spec, &part.mesh);
+        let rigid_modes = mesh.rigid_modes();
         let at = |k: usize, dof: usize| mesh.dof_of(&rigid_modes[k], dof);
         let motions = AtDofs { count: rigid_modes.len(), at: &at };
         let interface = InterfaceDofs::new(D, &mesh.rows, &mesh.prescribed(), motions);

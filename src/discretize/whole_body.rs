@@ -2,14 +2,14 @@
 //! supports leave, and that by which they move it.
 
 use super::approach;
+use super::body_mesh::BodyMesh;
 use super::scene_body::SceneBody;
 use crate::contact::ContactPair;
 use crate::error::Result;
-use crate::fem::{NodalForces, RigidMotion, rigid};
-use crate::linalg::{Blocks, Csr, PART, TOLERANCE, dot};
+use crate::fem::{NodalForces, RigidMotion};
+use crate::linalg::{Csr, PART};
 use crate::mesh::Mesh;
-use crate::model::{Motion, Segment, Sprung, motions::combined};
-use nalgebra::{DMatrix, DVector};
+use crate::model::{Motion, Segment};
 use std::collections::HashSet;
 
 /// Share of the largest possible work below which the work of the loads is rounding: the sum of a million works, each
@@ -23,14 +23,8 @@ pub struct WholeBody<'a, const D: usize> {
     pub part: SceneBody<'a, D>,
     /// Contact rows of the body, pair by pair.
     pub segments: Vec<Segment>,
-    /// Rigid motions of the free body.
-    pub rigid_modes: Vec<RigidMotion<D>>,
     /// Forces of all loads at dofs.
     pub load: NodalForces<D>,
-    /// The motions that supports and springs leave at present, as traces on the contact rows and works of the loads.
-    pub motions: Vec<Motion>,
-    /// The motions that supports alone leave, with the stiffness of the springs, if springs resist some of them.
-    pub sprung: Option<Sprung>,
     /// Rank that owns the body or, if it is distributed, most of it.
     pub owner: usize,
     /// Ranks that own nodes of the body.
@@ -55,11 +49,10 @@ impl<'a, const D: usize> WholeBody<'a, D> {
     fn new(mut part: SceneBody<'a, D>, segments: Vec<Segment>, pairs: &[ContactPair], mesh: &Mesh<D>) -> Result<Self> {
         part.mesh.approach = approach::rows(&part, &segments, pairs, mesh)?;
         part.mesh.load = part.load(mesh)?;
-        let (rigid_modes, load) = (part.mesh.rigid_modes(), part.mesh.load_on_dofs());
-        let mut body =
-            Self { part, segments, rigid_modes, load, motions: Vec::new(), sprung: None, owner: 0, ranks: Vec::new() };
+        part.mesh.find_motions();
+        let load = part.mesh.load_on_dofs();
+        let mut body = Self { part, segments, load, owner: 0, ranks: Vec::new() };
         body.collect_rows(pairs);
-        body.find_motions();
         Ok(body)
     }
 
@@ -75,24 +68,14 @@ impl<'a, const D: usize> WholeBody<'a, D> {
         (self.part.mesh.rows, self.part.mesh.nodal_rows) = (rows(|pair| &pair.rows), rows(|pair| &pair.nodal));
     }
 
-    /// Return the names of the motions that neither supports nor springs nor any contact row of the body resist.
-    pub fn unresisted(&self) -> Vec<String> {
-        let motions = &self.motions;
-        let resisted = DMatrix::from_fn(motions.len(), motions.len(), |i, j| dot(&motions[i].trace, &motions[j].trace));
-        let rows = motions.first().map_or(1, |motion| motion.trace.len().max(1));
-        let names = || motions.iter().map(|motion| motion.name.as_str());
-        let named = |weights: DVector<f64>| combined(names(), weights.iter().copied());
-        Blocks::free(&resisted, rows as f64, TOLERANCE).into_iter().map(named).collect()
-    }
-
-    /// Return the traces of motions on the contact rows, with the work of the loads on each.
-    fn with_works(&self, all: &[RigidMotion<D>]) -> Vec<Motion> {
-        let of = |(motion, work): (&RigidMotion<D>, f64)| Motion {
+    /// Return the motions that supports leave, as traces on the contact rows and works of the loads.
+    pub fn motions(&self) -> Vec<Motion> {
+        let of = |motion: &RigidMotion<D>| Motion {
             name: motion.name.clone(),
             trace: self.trace(motion),
-            work,
+            work: self.work(motion),
         };
-        all.iter().zip(self.works(all)).map(of).collect()
+        self.part.mesh.motions.iter().map(of).collect()
     }
 
     /// Return the trace of a motion on the contact rows.
@@ -101,38 +84,18 @@ impl<'a, const D: usize> WholeBody<'a, D> {
         (0..self.part.mesh.rows.rows()).map(row).collect()
     }
 
-    /// Return the work of the loads on motions. It is exactly zero where it is rounding.
-    fn works(&self, all: &[RigidMotion<D>]) -> Vec<f64> {
-        let of = |motion: &RigidMotion<D>| self.load.works(|node| self.part.mesh.at_dofs(motion, node));
-        let work = |[work, largest]: [f64; 2]| if work.abs() <= NO_WORK * largest { 0.0 } else { work };
-        all.iter().map(of).map(work).collect()
+    /// Return the work of the loads on a motion. It is exactly zero where it is rounding.
+    pub fn work(&self, motion: &RigidMotion<D>) -> f64 {
+        let [work, largest] = self.load.works(|node| self.part.mesh.at_dofs(motion, node));
+        if work.abs() <= NO_WORK * largest { 0.0 } else { work }
     }
 
-    /// Change each nodal force f by -|f| u, where u is the vector at the position of its node.
-    pub fn change_loads(&mut self, u: impl Fn(&[f64; D]) -> [f64; D]) {
-        let change = |(node, force): (u32, [f64; D])| {
-            let (size, u) = (dot(&force, &force).sqrt(), u(&self.part.mesh.space.nodes[node as usize]));
-            (node, std::array::from_fn(|c| force[c] - size * u[c]))
-        };
-        self.part.mesh.load = self.part.mesh.load.iter().map(change).collect();
-        self.load = self.part.mesh.load_on_dofs();
-    }
-
-    /// Find the motions that supports and springs leave to the body at present.
-    pub fn find_motions(&mut self) {
+    /// Change each nodal force to what `changed` returns for its node.
+    pub fn change_loads(&mut self, changed: impl Fn(&BodyMesh<D>, u32, [f64; D]) -> [f64; D]) {
         let mesh = &self.part.mesh;
-        let unsupported = mesh.unsupported(&self.rigid_modes);
-        let (springs, scale) =
-            (mesh.ground_stiffness(&unsupported), mesh.ground_stiffness(&self.rigid_modes).diagonal().max());
-        let left = if scale > 0.0 && !unsupported.is_empty() {
-            Blocks::free(&springs, scale, TOLERANCE).iter().map(|w| rigid::combine(&unsupported, w)).collect()
-        } else {
-            unsupported.clone()
-        };
-        let is_sprung = left.len() < unsupported.len();
-        self.sprung = is_sprung.then(|| Sprung { motions: self.with_works(&unsupported), stiffness: springs });
-        self.motions = self.with_works(&left);
-        (self.part.mesh.unconstrained_modes, self.part.mesh.unsupported_modes) = (left, unsupported);
+        let load = mesh.load.iter().map(|(node, force)| (node, changed(mesh, node, force))).collect();
+        self.part.mesh.load = load;
+        self.load = self.part.mesh.load_on_dofs();
     }
 
     /// Return the dof at which a motion can be fixed, and its displacement there. It is the one that the motion moves

@@ -183,7 +183,7 @@ impl Influence {
 /// least, measured by these springs.
 fn without_motions(model: &Model, pair: usize, springs: &[f64]) -> Vec<f64> {
     let of_pair = model.bodies.iter().filter(|slot| slot.is_rigid && slot.segments[0].pair == pair);
-    let motions: Vec<&[f64]> = of_pair.flat_map(|slot| &slot.motions).map(|motion| &motion.trace[..]).collect();
+    let motions: Vec<&[f64]> = of_pair.flat_map(|slot| slot.free_motions()).map(|motion| &motion.trace[..]).collect();
     let mut rest = vec![1.0; springs.len()];
     let force = |motion: &[f64]| motion.iter().zip(springs).map(|(m, spring)| m * spring).collect::<Vec<f64>>();
     let stiffness = DMatrix::from_fn(motions.len(), motions.len(), |i, j| dot(&force(motions[i]), motions[j]));

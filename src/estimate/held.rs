@@ -6,9 +6,10 @@
 //! errors. They do not concern deformations and pressures, so neither the error nor the solution includes them.
 
 use crate::discretize::meshes::KeptMeshes;
+use crate::fem::balance::{Balance, balanced};
 use crate::linalg::dot;
 use crate::model::motions::Motions;
-use crate::model::{Layer, Model};
+use crate::model::{BodySlot, Layer, Model};
 use nalgebra::{DMatrix, DVector};
 
 /// Share of the work that the contact forces could do, up to which loads may work on a motion that springs only keep in
@@ -31,10 +32,10 @@ impl HoldingSprings {
     /// next to nothing.
     pub fn of(model: &Model, layer: &Layer) -> Self {
         let none = || Self { motions: Vec::new(), amounts: DVector::zeros(0), energy: 0.0 };
-        if model.bodies.iter().all(|slot| slot.sprung.is_none()) {
+        if !model.bodies.iter().any(BodySlot::is_sprung) {
             return none();
         }
-        let all = Motions::with_springs(model);
+        let all = Motions::all(model);
         let ground = all.ground(model);
         let (loads, acting) = (all.loads(), all.sizes(&layer.force));
         let only_holds = |motion: &DVector<f64>| {
@@ -55,14 +56,14 @@ impl HoldingSprings {
 
     /// Add `sign` times the trace of these motions in the solution to `trace`.
     pub fn add_trace(&self, model: &Model, sign: f64, trace: &mut [f64]) {
-        let all = Motions::with_springs(model);
+        let all = Motions::all(model);
         for (motion, amount) in self.motions.iter().zip(self.amounts.iter()) {
             crate::linalg::axpy(sign * amount, &all.trace(model, motion), trace);
         }
     }
 
-    /// Balance the loads at all nodes of the bodies on these motions. `loads` is empty for bodies of other ranks. Each
-    /// nodal force changes in proportion to its magnitude. Collective.
+    /// Balance the loads at all nodes of the bodies on these motions ([`Balance`]). `loads` is empty for bodies of other
+    /// ranks. Collective.
     ///
     /// The forces that the springs would carry then act on the bodies themselves, as in a solution without springs.
     pub fn balance<const D: usize>(&self, meshes: &KeptMeshes<D>, model: &Model, loads: &mut [Vec<f64>]) {
@@ -70,30 +71,35 @@ impl HoldingSprings {
         if count == 0 {
             return;
         }
-        let all = Motions::with_springs(model);
-        let amounts = |k: usize, body: usize| self.motions[k].as_slice()[all.of_body(body)].to_vec();
-        let mut sums = vec![0.0; count * (count + 1)];
-        for (body, load) in loads.iter().enumerate().filter(|(_, load)| !load.is_empty()) {
-            let moved: Vec<Vec<f64>> = (0..count).map(|k| meshes.moved(body, &amounts(k, body))).collect();
-            let sizes = meshes.sizes(load);
-            for (i, u) in moved.iter().enumerate() {
-                sums[i] += dot(u, load);
-                let weighted: Vec<f64> = u.iter().zip(&sizes).map(|(u, size)| u * size).collect();
-                moved.iter().enumerate().for_each(|(j, v)| sums[count * (i + 1) + j] += dot(&weighted, v));
-            }
+        let all = Motions::all(model);
+        let moved: Vec<Vec<Vec<f64>>> = (0..loads.len())
+            .map(|body| {
+                let amounts = |k: usize| &self.motions[k].as_slice()[all.of_body(body)];
+                let is_here = !loads[body].is_empty();
+                (0..count).filter(|_| is_here).map(|k| meshes.moved(body, amounts(k))).collect()
+            })
+            .collect();
+        let at = |body: usize, node: usize| -> Vec<(usize, [f64; D])> {
+            moved[body].iter().map(|u| vector::<D>(u, node)).enumerate().collect()
+        };
+        let (mut balance, mut works) = (Balance::new(count), DVector::zeros(count));
+        for (body, load) in loads.iter().enumerate() {
+            moved[body].iter().enumerate().for_each(|(k, u)| works[k] += dot(u, load));
+            (0..load.len() / D).for_each(|node| balance.add(vector::<D>(load, node), &at(body, node)));
         }
-        model.exchange.sum(&mut sums);
-        let (work, products) = sums.split_at(count);
-        let Some(factor) = DMatrix::from_row_slice(count, count, products).cholesky() else { return };
-        let shares = factor.solve(&DVector::from_column_slice(work));
-        for (body, load) in loads.iter_mut().enumerate().filter(|(_, load)| !load.is_empty()) {
-            let sizes = meshes.sizes(load);
-            for k in 0..count {
-                let moved = meshes.moved(body, &amounts(k, body));
-                for ((load, u), size) in load.iter_mut().zip(moved).zip(&sizes) {
-                    *load -= shares[k] * size * u;
-                }
+        model.exchange.sum(works.as_mut_slice());
+        model.exchange.sum(balance.sums());
+        let amounts = balance.amounts(&works);
+        for (body, load) in loads.iter_mut().enumerate() {
+            for node in 0..load.len() / D {
+                let changed = balanced(vector::<D>(load, node), &at(body, node), &amounts);
+                load[D * node..][..D].copy_from_slice(&changed);
             }
         }
     }
+}
+
+/// Return the components at a node of a vector over the displacements of nodes.
+fn vector<const D: usize>(all: &[f64], node: usize) -> [f64; D] {
+    std::array::from_fn(|c| all[D * node + c])
 }

@@ -6,6 +6,7 @@
 //! component`.
 
 pub mod assemble;
+pub mod balance;
 pub mod displacement;
 pub mod elasticity;
 pub mod element;

@@ -193,6 +193,22 @@ pub fn combine<const D: usize>(motions: &[RigidMotion<D>], weights: &DVector<f64
     RigidMotion { weights: sum.weights.map(|weight| weight / largest), ..sum }
 }
 
+/// Return a basis of the span of motions about the same centre that begins with the combinations of these orthonormal
+/// weights. The motions that are farthest from the span so far complete it.
+pub fn completed<const D: usize>(motions: &[RigidMotion<D>], first: &[DVector<f64>]) -> Vec<RigidMotion<D>> {
+    let mut basis: Vec<RigidMotion<D>> = first.iter().map(|weights| combine(motions, weights)).collect();
+    let mut rest = DMatrix::identity(motions.len(), motions.len());
+    first.iter().for_each(|weights| rest -= weights * weights.tr_mul(&rest));
+    while basis.len() < motions.len() {
+        let norm = |k: usize| rest.column(k).norm();
+        let farthest = (0..motions.len()).fold(0, |most, k| if norm(k) > norm(most) { k } else { most });
+        let direction = rest.column(farthest).normalize();
+        rest -= &direction * direction.tr_mul(&rest);
+        basis.push(motions[farthest].clone());
+    }
+    basis
+}
+
 /// Return the weighted sum of motions about the same centre.
 pub fn sum<const D: usize>(motions: &[RigidMotion<D>], weights: &DVector<f64>) -> RigidMotion<D> {
     let sum = |k: usize| motions.iter().zip(weights).map(|(motion, weight)| weight * motion.weights[k]).sum();

@@ -47,7 +47,7 @@ impl RigidSpace {
     pub fn of(model: &Model, offset: &[usize], rows: &Csr, first: usize) -> Option<MakeSubspace> {
         let mut free_sides = vec![0; model.pairs.len()];
         let bodies: Vec<(Vec<Segment>, Vec<Motion>)> = model.bodies.iter().map(of_body).collect();
-        for slot in model.bodies.iter().filter(|slot| !slot.motions.is_empty() && !slot.is_rigid) {
+        for slot in model.bodies.iter().filter(|slot| slot.free > 0 && !slot.is_rigid) {
             slot.segments.iter().for_each(|segment| free_sides[segment.pair] += 1);
         }
         if !free_sides.contains(&2) {
@@ -86,7 +86,7 @@ impl RigidSpace {
 
 /// Return the contact rows and motions of a body in the matrix, which does not have those of rigid parts.
 fn of_body(slot: &BodySlot) -> (Vec<Segment>, Vec<Motion>) {
-    (slot.segments.clone(), if slot.is_rigid { Vec::new() } else { slot.motions.clone() })
+    (slot.segments.clone(), if slot.is_rigid { Vec::new() } else { slot.free_motions().to_vec() })
 }
 
 fn motions_of<'m>(bodies: &'m [(Vec<Segment>, Vec<Motion>)], points: &[usize]) -> Motions<'m> {

@@ -17,7 +17,7 @@ use super::dofs::pins;
 use super::field::add_forces;
 use super::linear::{Failure, LinearSolution, LinearStep, Solved, System};
 use super::motions::Motions;
-use super::{Body, Field, Model};
+use super::{Body, BodySlot, Field, Model};
 use crate::error::{Error, Kind, Result};
 use crate::exchange::{Exchange, broadcast};
 use crate::linalg::{axpy, dot};
@@ -57,7 +57,7 @@ impl ComplianceStep {
     /// Failures of LAPACK.
     pub fn new(model: &Model) -> Result<Option<Self>> {
         let n = model.points();
-        let is_sprung = model.bodies.iter().any(|slot| slot.sprung.is_some());
+        let is_sprung = model.bodies.iter().any(BodySlot::is_sprung);
         let mut is_missing = [f64::from(u8::from(is_sprung || model.meshed() == 1))];
         let mut bodies: Vec<Option<PinnedStiffness>> = model.bodies.iter().map(|_| None).collect();
         let mut compliance = vec![0.0; n * n];

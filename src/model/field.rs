@@ -42,7 +42,7 @@ impl Field {
         let state = |slot: &BodySlot| slot.local.as_ref().map_or(Vec::new(), &displacements);
         Field {
             displacements: model.bodies.iter().map(state).collect(),
-            rigid: model.bodies.iter().map(|slot| vec![0.0; slot.motions.len()]).collect(),
+            rigid: model.bodies.iter().map(|slot| vec![0.0; slot.free]).collect(),
             trace: vec![0.0; 2 * model.points()],
         }
     }
@@ -145,7 +145,8 @@ pub fn residual(model: &Model, products: Vec<Vec<f64>>, u: &Field, force: &[f64]
         sum.strain += energy.strain;
         sum.potential += energy.potential;
         if body.dofs().leads() {
-            sum.potential -= slot.motions.iter().zip(&u.rigid[index]).map(|(motion, a)| motion.work * a).sum::<f64>();
+            sum.potential -=
+                slot.free_motions().iter().zip(&u.rigid[index]).map(|(motion, a)| motion.work * a).sum::<f64>();
         }
         r
     };

@@ -78,15 +78,6 @@ pub struct Mechanism {
     pub fixed: Option<usize>,
 }
 
-/// The rigid motions of a body on springs to the ground. The start of an iteration moves bodies on soft springs, too.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Sprung {
-    /// All motions that supports leave free, whether springs resist them or not.
-    pub motions: Vec<Motion>,
-    /// Stiffness of the springs on these motions: one row and column a motion.
-    pub stiffness: DMatrix<f64>,
-}
-
 /// A body in the model, or a rigid part. Every rank has the arrays; only the ranks where the body lives have the body
 /// itself.
 ///
@@ -103,10 +94,12 @@ pub struct BodySlot {
     pub is_rigid: bool,
     /// Its contact rows: the groups in their order.
     pub segments: Vec<Segment>,
-    /// Rigid motions that neither supports nor springs constrain.
+    /// The rigid motions E that its supports leave. First come the free ones, which springs leave, too.
     pub motions: Vec<Motion>,
-    /// The rigid motions that supports leave free, if springs resist some of them.
-    pub sprung: Option<Sprung>,
+    /// E'KE of the springs to the ground: one row and column a motion, zero for the free ones.
+    pub ground: DMatrix<f64>,
+    /// Number of the free motions.
+    pub free: usize,
     /// Largest diagonal entry of K.
     pub scale: f64,
     /// Elastic modulus under pressure on its contact surfaces: E/(1 - nu^2), or about that.
@@ -127,8 +120,9 @@ impl BodySlot {
             local: None,
             is_rigid: true,
             segments: vec![Segment { pair, side: 1 }],
+            ground: DMatrix::zeros(motions.len(), motions.len()),
+            free: motions.len(),
             motions,
-            sprung: None,
             scale: 0.0,
             modulus: f64::INFINITY,
             depth: 1.0,
@@ -137,10 +131,20 @@ impl BodySlot {
         }
     }
 
+    /// Return the motions that neither supports nor springs constrain.
+    pub fn free_motions(&self) -> &[Motion] {
+        &self.motions[..self.free]
+    }
+
+    /// Return whether springs to the ground resist some of its motions.
+    pub fn is_sprung(&self) -> bool {
+        self.free < self.motions.len()
+    }
+
     /// Return the work of the loads and of forces at the contact rows, which push the body away, on each of its free
     /// motions.
     pub fn works(&self, force: &[f64]) -> Vec<f64> {
-        self.motions.iter().map(|motion| motion.work - dot(&motion.trace, force)).collect()
+        self.free_motions().iter().map(|motion| motion.work - dot(&motion.trace, force)).collect()
     }
 
     /// Return how the dofs of the body are distributed over the ranks; `None` for a body of one rank, and for one that
@@ -446,7 +450,8 @@ pub(crate) mod sample {
             is_rigid: false,
             segments: (0..2).map(|pair| Segment { pair, side }).collect(),
             motions: Vec::new(),
-            sprung: None,
+            ground: DMatrix::zeros(0, 0),
+            free: 0,
             scale: 1.0,
             modulus: 3.0,
             depth: 1.0,

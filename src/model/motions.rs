@@ -71,17 +71,17 @@ impl<'a> Motions<'a> {
 
     /// Return the motions of a model's bodies that neither supports nor springs constrain.
     pub fn of(model: &'a Model) -> Self {
-        Self::of_model(model, |slot| &slot.motions)
+        Self::of_model(model, BodySlot::free_motions)
     }
 
     /// Return the motions of a model's bodies that supports leave free, with those that springs to the ground resist.
-    pub fn with_springs(model: &'a Model) -> Self {
-        Self::of_model(model, |slot| slot.sprung.as_ref().map_or(&slot.motions, |sprung| &sprung.motions))
+    pub fn all(model: &'a Model) -> Self {
+        Self::of_model(model, |slot| &slot.motions)
     }
 
-    fn of_model(model: &'a Model, motions: impl Fn(&'a BodySlot) -> &'a Vec<Motion>) -> Self {
+    fn of_model(model: &'a Model, motions: impl Fn(&'a BodySlot) -> &'a [Motion]) -> Self {
         let points: Vec<usize> = (0..model.pairs.len()).map(|pair| model.range(pair).len()).collect();
-        Self::new(model.bodies.iter().map(|slot| (&slot.segments[..], &motions(slot)[..])), &points)
+        Self::new(model.bodies.iter().map(|slot| (&slot.segments[..], motions(slot))), &points)
     }
 
     /// Return the number of all motions.
@@ -102,8 +102,8 @@ impl<'a> Motions<'a> {
     /// Return the stiffness E'KE of the springs to the ground. The matrix has a row and column of blocks for each body.
     pub fn ground(&self, model: &Model) -> Blocks {
         let mut ground = self.blocks();
-        let sprung = model.bodies.iter().enumerate().filter_map(|(body, slot)| Some((body, slot.sprung.as_ref()?)));
-        sprung.for_each(|(body, sprung)| ground.add(body, body, &sprung.stiffness));
+        let sprung = model.bodies.iter().enumerate().filter(|(_, slot)| slot.is_sprung());
+        sprung.for_each(|(body, slot)| ground.add(body, body, &slot.ground));
         ground
     }
 

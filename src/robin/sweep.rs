@@ -273,7 +273,7 @@ pub fn underconstrained(model: &Model, weight: &[f64]) -> Option<NamedMotion> {
         // a rigid part has no stiffness of its own to compare with
         let full = if slot.is_rigid { springs.diagonal().max().max(f64::MIN_POSITIVE) } else { slot.scale };
         let free = Blocks::free(&springs, full, TOLERANCE);
-        let names = slot.motions.iter().map(|motion| &motion.name[..]);
+        let names = slot.free_motions().iter().map(|motion| &motion.name[..]);
         Some(NamedMotion { body, name: combined(names, free.first()?.iter().copied()) })
     })
 }
@@ -286,7 +286,7 @@ const WEAK: f64 = 1e-3;
 /// whole.
 fn constrained(model: &Model, mut weight: Vec<f64>) -> Vec<f64> {
     let holding = model.holding_stiffness();
-    for (body, _) in model.bodies.iter().enumerate().filter(|(_, slot)| !slot.motions.is_empty()) {
+    for (body, _) in model.bodies.iter().enumerate().filter(|(_, slot)| slot.free > 0) {
         // the stiffness under each row, spread over all rows
         let mut surface = model.of_body(body, &holding);
         let rows = surface.len().max(1) as f64;
@@ -308,7 +308,7 @@ fn constrained(model: &Model, mut weight: Vec<f64>) -> Vec<f64> {
 
 /// Return the stiffness of springs at a body's contact rows in terms of its free motions, a square matrix.
 fn springs(model: &Model, body: usize, weight: &[f64]) -> DMatrix<f64> {
-    let motions = &model.bodies[body].motions;
+    let motions = model.bodies[body].free_motions();
     DMatrix::from_fn(motions.len(), motions.len(), |i, j| {
         let (s, t) = (&motions[i].trace, &motions[j].trace);
         (0..weight.len()).map(|q| weight[q] * s[q] * t[q]).sum()

@@ -83,7 +83,7 @@ pub fn next_step(done: Done, mut start: Option<InitialGuess>, clock: &mut Clock)
     let ready = built.and_then(|built| {
         if let Some(InitialGuess::Known(solution)) = &mut start {
             let Discrete { model, specs, is_renewed, .. } = &built.discrete;
-            let (history, counts) = (&built.scene.method.steps, model.bodies.iter().map(|slot| slot.motions.len()));
+            let (history, counts) = (&built.scene.method.steps, model.bodies.iter().map(|slot| slot.free));
             let has_dofs = *is_renewed && counts.eq(solution.field.rigid.iter().map(Vec::len));
             // with other dofs the pressures alone are known, and moved supports would strain the cells beside them
             if !has_dofs

@@ -37,7 +37,7 @@ fn recover_body(slot: &BodySlot, body: &Body, iterate: &Field, index: usize) -> 
     let state = body.recover(&body.dofs().join(bent, amounts))?;
     // a motion that springs resist counts as deformation; the amounts are the same on all ranks, so all of them take
     // the same branch
-    let is_whole = slot.sprung.is_some() || amounts.iter().all(|a| *a == 0.0);
+    let is_whole = slot.is_sprung() || amounts.iter().all(|a| *a == 0.0);
     let bent = if is_whole { state.clone() } else { body.recover(bent)? };
     Ok(Recovered::new(state, bent))
 }
