@@ -23,7 +23,6 @@ mod prepare;
 mod scene_body;
 mod supports;
 mod verify;
-mod whole_body;
 
 pub use approach::mean_normal;
 pub use assembly::{Assembled, Factory};

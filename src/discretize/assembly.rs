@@ -2,17 +2,18 @@
 
 use super::body_mesh::BodyMesh;
 use super::facts::BodyInfo;
+use super::groups::point;
 use super::post::FemBody;
-use super::scene_body::{SceneBody, elasticity_of};
-use crate::error::Result;
+use super::scene_body::{elasticity_of, refusal};
+use crate::error::{Error, Result};
 use crate::exchange::Plain;
-use crate::fem::rigid;
-use crate::fem::{ElasticBody, Prolongation};
-use crate::linalg::Csr;
+use crate::fem::{ElasticBody, Elasticity, NodeGraph, Prolongation, assemble, rigid, support};
+use crate::linalg::{Csr, countable};
 use crate::mesh::Mesh;
 use crate::model::{Body, BodyCounts, BodyFacts, BodySlot, Distribution, InterfaceDofs};
 use crate::problem::{BodySpec, Plane};
 use std::cell::OnceCell;
+use std::path::Path;
 use std::rc::Rc;
 
 /// The assembly of all bodies on one rank.
@@ -61,15 +62,13 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
         slot: &mut BodySlot,
         info: &mut BodyInfo,
     ) -> Result<()> {
-        let elasticity = elasticity_of(spec, std::mem::take(&mut mesh.regions), D, self.plane)?;
-        let mut part = SceneBody { spec, elasticity: Rc::new(elasticity), mesh };
-        let own = part.mesh.own_nodes();
-        if part.mesh.is_owned {
-            self.give_solver(&mut part, before, slot, info.rank)?;
+        let elasticity = Rc::new(elasticity_of(spec, std::mem::take(&mut mesh.regions), D, self.plane)?);
+        let (name, exact, supports, own) = (info.name.clone(), spec.exact.clone(), spec.fix.len(), mesh.own_nodes());
+        let mut body = FemBody { name, exact, supports, mesh, own, elasticity, split: OnceCell::new() };
+        if body.mesh.is_owned {
+            self.give_solver(spec, &mut body, before, slot, info.rank)?;
         }
-        let SceneBody { elasticity, mesh, .. } = part;
-        let (name, exact, supports) = (info.name.clone(), spec.exact.clone(), spec.fix.len());
-        let body = Rc::new(FemBody { name, exact, supports, mesh, own, elasticity, split: OnceCell::new() });
+        let body = Rc::new(body);
         if body.mesh.is_owned {
             body.check_exact()?;
             info.points = body.points();
@@ -83,20 +82,21 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
     /// than the `owner` scale and stiffness of rows stay zero until [`Discrete::share`](super::Discrete::share).
     fn give_solver(
         &mut self,
-        part: &mut SceneBody<D>,
+        spec: &BodySpec,
+        fem: &mut FemBody<D>,
         before: EarlierBody,
         slot: &mut BodySlot,
         owner: usize,
     ) -> Result<()> {
-        let (load, is_owner) = (part.mesh.load_vector(), owner == self.rank);
+        let (load, is_owner) = (fem.mesh.load_vector(), owner == self.rank);
         if let Some((mut body, BodySlot { scale, row_stiffness, .. })) = before.serving {
-            body.reload(load, part.mesh.prescribed())?;
+            body.reload(load, fem.mesh.prescribed())?;
             (slot.local, slot.scale, slot.row_stiffness) = (Some(body), scale, row_stiffness);
             // the sums of all ranks are known
             slot.row_stiffness.iter_mut().filter(|_| !is_owner).for_each(|stiffness| *stiffness = 0.0);
         } else {
             self.assemblies += usize::from(is_owner);
-            self.assemble(part, load, slot)?;
+            self.assemble(spec, fem, load, slot)?;
             slot.local.iter_mut().for_each(|body| body.count_on(before.counts));
         }
         slot.scale = if is_owner { slot.scale } else { 0.0 };
@@ -105,25 +105,31 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
 
     /// Assemble the matrix of a body, all of it or the rows of this rank, and make its solver, which takes the contact
     /// rows.
-    fn assemble(&mut self, part: &mut SceneBody<D>, load: Vec<f64>, slot: &mut BodySlot) -> Result<()> {
-        let prescribed = part.mesh.prescribed();
-        let modes = part.mesh.free_motions().iter();
-        let mut unconstrained_modes: Vec<Vec<f64>> = modes.map(|motion| part.mesh.dofs_of(motion)).collect();
+    fn assemble(
+        &mut self,
+        spec: &BodySpec,
+        FemBody { elasticity, mesh, .. }: &mut FemBody<D>,
+        load: Vec<f64>,
+        slot: &mut BodySlot,
+    ) -> Result<()> {
+        let prescribed = mesh.prescribed();
+        let modes = mesh.free_motions().iter();
+        let mut unconstrained_modes: Vec<Vec<f64>> = modes.map(|motion| mesh.dofs_of(motion)).collect();
         unconstrained_modes.iter_mut().for_each(|motion| prescribed.iter().for_each(|entry| motion[entry.0] = 0.0));
-        part.mesh.graph();
-        let (owned, rows) = (part.mesh.owned.take(), std::mem::take(&mut part.mesh.rows));
-        let mut graph = part.mesh.graph.take().unwrap_or_else(|| unreachable!("the graph was requested"));
+        mesh.graph();
+        let (owned, rows) = (mesh.owned.take(), std::mem::take(&mut mesh.rows));
+        let mut graph = mesh.graph.take().unwrap_or_else(|| unreachable!("the graph was requested"));
         if let Some(owned) = &owned {
             graph = graph.of(|node| owned.is_own::<D>(node));
         }
-        let mut body = part.assemble(self.mesh, &graph, load, prescribed)?;
+        let mut body = elastic_body(spec, elasticity, mesh, &self.mesh.path, &graph, load, prescribed)?;
         drop(graph);
         slot.scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
         slot.row_stiffness = rows.quadratic_diagonal(&body.stiffness);
         if let Some(owned) = &owned {
             body = owned.restrict::<D>(body);
         }
-        let mesh = &part.mesh;
+        let mesh = &*mesh;
         let interpolation = self.factory.wants_interpolation(&slot.name).then(|| match &owned {
             Some(owned) => owned.interpolation::<D>(|coarse| mesh.interpolation(coarse)),
             None => mesh.interpolation(&mesh.coarse_nodes()),
@@ -144,6 +150,39 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
         slot.local = Some(body);
         Ok(())
     }
+}
+
+/// Assemble K of a body on its graph, with f and the supports. If the graph has the rows of some nodes only, so have K
+/// and f. `path` is that of the mesh.
+fn elastic_body<const D: usize>(
+    spec: &BodySpec,
+    elasticity: &Elasticity,
+    body: &BodyMesh<D>,
+    path: &Path,
+    graph: &NodeGraph,
+    mut load: Vec<f64>,
+    prescribed: Vec<(usize, f64)>,
+) -> Result<ElasticBody> {
+    let name = &spec.name;
+    countable(&format!("the stiffness matrix of body `{}`", name.value), graph.entries::<D>())?;
+    let mut stiffness =
+        assemble::stiffness(&body.space, graph, &body.held.frame, elasticity).map_err(|defect| match defect {
+            assemble::Defect::Inverted(cell) => {
+                let corner = body.space.in_scene(body.space.cell_nodes(cell)[0]);
+                let message = format!("body `{}`: the curved cell at {} is folded", name.value, point(corner));
+                Error::mesh(path, None, message).help("refine the mesh there, or use order = 1")
+            }
+            assemble::Defect::Elasticity(number, x, flaw) => refusal(spec, number, Some(x), &flaw),
+        })?;
+    if (0..stiffness.rows()).any(|row| stiffness.row(row).any(|(_, k)| !k.is_finite())) {
+        let message = format!("body `{}`: its stiffness is beyond the range of numbers", name.value);
+        return Err(Error::scene(&spec.elasticity().place, message).label("far too large"));
+    }
+    let frame = &body.held.frame;
+    body.springs.iter().for_each(|springs| assemble::add_blocks(graph, frame, springs, &mut stiffness));
+    // These rows belong to other ranks.
+    (0..load.len()).filter(|&i| stiffness.range(i).is_empty()).for_each(|i| load[i] = 0.0);
+    Ok(support(stiffness, load, prescribed))
 }
 
 /// A maker of the inner solvers of bodies.

@@ -1,7 +1,7 @@
 //! What all ranks have of a body: the arrays of the model, and the facts that reports need.
 
 use super::post::Post;
-use super::whole_body::WholeBody;
+use super::scene_body::SceneBody;
 use crate::contact::ContactPair;
 use crate::fem;
 use crate::linalg::{Blocks, TOLERANCE, dot};
@@ -63,53 +63,65 @@ impl BodyInfo {
     }
 }
 
-impl<const D: usize> WholeBody<'_, D> {
+impl<const D: usize> SceneBody<'_, D> {
     /// Return what all ranks have of the body: the arrays of the model and the facts for reports. `checked` is the
-    /// result of the check of its mesh.
-    pub fn shared(&self, pairs: &[ContactPair], checked: &BodyCheck, plane: Plane) -> (BodySlot, BodyInfo) {
+    /// result of the check of its mesh, and `owners` are the rank that owns the body or most of it, and all that own
+    /// nodes of it.
+    pub fn shared(
+        &self,
+        pairs: &[ContactPair],
+        checked: &BodyCheck,
+        plane: Plane,
+        owners: &(usize, Vec<usize>),
+    ) -> (BodySlot, BodyInfo) {
         let of_body = || self.segments.iter().map(|segment| &pairs[segment.pair]);
         let surface: f64 = of_body().map(|pair| pair.area.iter().sum::<f64>()).sum();
-        let (volume, moduli) = self.part.volume_and_moduli();
+        let (volume, moduli) = self.volume_and_moduli();
         let (modulus, depth) = (dot(&moduli, &along_axes(of_body())), volume / surface);
         let slot = BodySlot {
-            name: self.part.spec.name.value.clone(),
+            name: self.spec.name.value.clone(),
             local: None,
             is_rigid: false,
             segments: self.segments.clone(),
             motions: self.motions(),
-            ground: self.part.mesh.ground_stiffness(&self.part.mesh.motions),
-            free: self.part.mesh.free,
+            ground: self.mesh.ground_stiffness(&self.mesh.motions),
+            free: self.mesh.free,
             scale: 0.0,
             modulus,
             depth,
             row_stiffness: Vec::new(),
-            imposed: self.trace(&self.part.mesh.imposed_motion()),
+            imposed: self.trace(&self.mesh.imposed_motion()),
         };
-        let info = self.info(checked, plane, unresisted(slot.free_motions()));
+        let info = BodyInfo {
+            unresisted: unresisted(slot.free_motions()),
+            warning: self.locking(plane),
+            rank: owners.0,
+            ranks: owners.1.clone(),
+            ..self.info(checked)
+        };
         (slot, info)
     }
 
-    fn info(&self, checked: &BodyCheck, plane: Plane, unresisted: Vec<String>) -> BodyInfo {
-        let part = &self.part;
-        let spec = part.spec;
+    fn info(&self, checked: &BodyCheck) -> BodyInfo {
+        let Self { spec, mesh, .. } = self;
         BodyInfo {
             name: spec.name.value.clone(),
-            datum: fem::pad(part.mesh.space.datum),
-            nodes: part.mesh.space.nodes.len(),
+            datum: fem::pad(mesh.space.datum),
+            nodes: mesh.space.nodes.len(),
             points: Vec::new(),
-            cells: part.mesh.space.cell_count(),
+            cells: mesh.space.cell_count(),
             facets: BodyCheck { points: Vec::new(), ..checked.clone() },
-            order: part.mesh.space.order,
-            dofs: part.mesh.space.dofs(),
-            supported: part.mesh.held.supported(),
-            unconstrained: part.mesh.free_motions().iter().map(|motion| motion.name.clone()).collect(),
-            unresisted,
-            warning: part.locking(plane),
-            rank: self.owner,
-            ranks: self.ranks.clone(),
+            order: mesh.space.order,
+            dofs: mesh.space.dofs(),
+            supported: mesh.held.supported(),
+            unconstrained: mesh.free_motions().iter().map(|motion| motion.name.clone()).collect(),
+            unresisted: Vec::new(),
+            warning: None,
+            rank: 0,
+            ranks: Vec::new(),
             supports: spec.fix.iter().map(|support| support.on.value.clone()).collect(),
             springs: spec.spring.iter().map(|spring| spring.on.value.clone()).collect(),
-            rigid: part.mesh.held.rigid.iter().map(|surface| spec.load[surface.load].on.value.clone()).collect(),
+            rigid: mesh.held.rigid.iter().map(|surface| spec.load[surface.load].on.value.clone()).collect(),
             post: None,
         }
     }

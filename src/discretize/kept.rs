@@ -4,7 +4,6 @@
 use super::pairs::{Contact, ContactFacts, KeptPairs, PairInputs};
 use super::partition::Partition;
 use super::scene_body::SceneBody;
-use super::whole_body::WholeBody;
 use crate::contact::ContactPair;
 use crate::fem::{Elasticity, Frame, NodalBlock, Space};
 use crate::linalg::Csr;
@@ -71,11 +70,11 @@ pub struct MatrixInputs<const D: usize> {
 
 impl<const D: usize> MatrixInputs<D> {
     /// Return what is known of a body before its contacts.
-    pub fn of(part: &SceneBody<D>) -> Self {
-        let mesh = &part.mesh;
+    pub fn of(body: &SceneBody<D>) -> Self {
+        let mesh = &body.mesh;
         Self {
             space: mesh.space.clone(),
-            elasticity: part.elasticity.clone(),
+            elasticity: body.elasticity.clone(),
             springs: mesh.springs.clone(),
             frame: mesh.held.frame.clone(),
             supported: mesh.prescribed().into_iter().map(|(dof, u)| (dof, u != 0.0)).collect(),
@@ -85,9 +84,9 @@ impl<const D: usize> MatrixInputs<D> {
     }
 
     /// Add the contact rows, and the dofs that are fixed.
-    pub fn complete(&mut self, body: &WholeBody<D>) {
-        self.rows = body.part.mesh.rows.clone();
-        self.prescribed = body.part.mesh.held.prescribed.keys().copied().collect();
+    pub fn complete(&mut self, body: &SceneBody<D>) {
+        self.rows = body.mesh.rows.clone();
+        self.prescribed = body.mesh.held.prescribed.keys().copied().collect();
     }
 
     /// Return whether both bodies have the same material.

@@ -12,7 +12,7 @@
 //! may lack balance on facets, and by quadrature. A small imbalance is taken from the loads, with a warning.
 
 use super::body_mesh::BodyMesh;
-use super::whole_body::{NO_WORK, WholeBody};
+use super::scene_body::{NO_WORK, SceneBody};
 use crate::contact::ContactPair;
 use crate::error::{few, joined};
 use crate::fem::balance::{Balance, balanced};
@@ -29,7 +29,7 @@ const LACKING: f64 = 1e-3;
 /// from the balance of loads.
 ///
 /// Both sides of a pair slide along each other in such a motion: the normals of the pair are turned across it.
-pub fn fix<const D: usize>(bodies: &mut [WholeBody<D>], pairs: &mut [ContactPair], lack: f64) -> Vec<Mechanism> {
+pub fn fix<const D: usize>(bodies: &mut [SceneBody<D>], pairs: &mut [ContactPair], lack: f64) -> Vec<Mechanism> {
     let tilt = pairs.iter().map(|pair| pair.uncertainty).fold(0.0, f64::max);
     let mut search =
         MechanismSearch { bodies, pairs, tilt, lack: lack.max(LACKING), found: Vec::new(), fixed: Vec::new() };
@@ -66,7 +66,7 @@ struct NearMotion {
 }
 
 struct MechanismSearch<'p, 's, const D: usize> {
-    bodies: &'p mut [WholeBody<'s, D>],
+    bodies: &'p mut [SceneBody<'s, D>],
     pairs: &'p mut [ContactPair],
     /// Angle by which errors of coordinates turn normals.
     tilt: f64,
@@ -81,11 +81,11 @@ struct MechanismSearch<'p, 's, const D: usize> {
 impl<const D: usize> MechanismSearch<'_, '_, D> {
     /// Return the motions that supports and springs leave to a body at present.
     fn unconstrained(&self, body: usize) -> &[RigidMotion<D>] {
-        self.bodies[body].part.mesh.free_motions()
+        self.bodies[body].mesh.free_motions()
     }
 
     fn extent(&self, body: usize) -> &PointExtent {
-        &self.bodies[body].part.mesh.extent
+        &self.bodies[body].mesh.extent
     }
 
     /// Return the groups of at least two bodies that pairs connect, in the order of their first bodies. A group before
@@ -106,7 +106,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
     /// Return the rigid motions of some bodies as one.
     fn common(&self, bodies: &[usize]) -> Vec<RigidMotion<D>> {
         let extent = bodies.iter().fold(PointExtent::default(), |all, &body| all.join(self.extent(body)));
-        rigid::of(&extent, bodies.iter().any(|&body| self.bodies[body].part.mesh.space.axisymmetric))
+        rigid::of(&extent, bodies.iter().any(|&body| self.bodies[body].mesh.space.axisymmetric))
     }
 
     /// Return the displacements of the corners of the box around a body.
@@ -231,7 +231,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
             let normal: Vec<[f64; D]> = (0..pair.len()).map(|q| self.across(&motions, pair, q)).collect();
             // an obstacle has the rows of the surface before it until it is a rigid part
             let [a, b] = pair.bodies;
-            let meshes = [a, if b < self.bodies.len() { b } else { a }].map(|body| &self.bodies[body].part.mesh);
+            let meshes = [a, if b < self.bodies.len() { b } else { a }].map(|body| &self.bodies[body].mesh);
             let pair = &mut self.pairs[number];
             pair.turn(&normal, meshes.map(|mesh| &*mesh.space));
             for (side, mesh) in meshes.into_iter().enumerate() {
@@ -241,14 +241,14 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
         }
         for (_, body) in self.bodies.iter_mut().enumerate().filter(|(number, _)| turned.contains(number)) {
             body.collect_rows(self.pairs);
-            body.part.mesh.find_motions();
+            body.mesh.find_motions();
         }
     }
 
     /// Return whether the two sides of a pair slide along each other in a motion. Bodies that move as one do not.
     fn slides(&self, moving: &GroupMotion<D>, pair: &ContactPair) -> bool {
         let at = |body: usize, x: &[f64; 3]| {
-            let motion = moving.of(body).map(|motion| (motion, self.bodies[body].part.mesh.space.datum));
+            let motion = moving.of(body).map(|motion| (motion, self.bodies[body].mesh.space.datum));
             motion.map_or([0.0; D], |(motion, datum)| motion.at(&std::array::from_fn(|c| x[c] - datum[c])))
         };
         let [a, b] = pair.bodies;
@@ -262,7 +262,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
             for (side, (&body, sign)) in pair.bodies.iter().zip([1.0, -1.0]).enumerate() {
                 let Some(motion) = moving.of(body) else { continue };
                 for (node, share) in pair.shares::<D>(side, q) {
-                    let u = self.bodies[body].part.mesh.at(motion, node);
+                    let u = self.bodies[body].mesh.at(motion, node);
                     v.axpy(sign * share, &DVector::from_row_slice(&u), 1.0);
                 }
             }
@@ -281,7 +281,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
     /// Return the displacements of the points of a pair by the motions of a body, one column each, times the root of
     /// the share of each point in the area.
     fn at_points(&self, body: usize, pair: &ContactPair) -> DMatrix<f64> {
-        let (motions, datum) = (self.unconstrained(body), &self.bodies[body].part.mesh.space.datum);
+        let (motions, datum) = (self.unconstrained(body), &self.bodies[body].mesh.space.datum);
         let area: f64 = pair.area.iter().sum();
         let roots: Vec<f64> = pair.area.iter().map(|own| (own / area).sqrt()).collect();
         let points = || pair.position.iter().map(|x| std::array::from_fn(|c| x[c] - datum[c]));
@@ -347,7 +347,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
             }
             self.found.push(mechanism);
         }
-        self.bodies.iter_mut().for_each(|body| body.part.mesh.find_motions());
+        self.bodies.iter_mut().for_each(|body| body.mesh.find_motions());
     }
 
     /// Return motions of the same bodies with their names. Where the bodies move as one, translations and rotations are
@@ -385,7 +385,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
     fn name_of_each(&self, moving: &GroupMotion<D>) -> String {
         let each = moving.bodies.iter().zip(&moving.motions);
         let name = |(&body, motion): (&usize, &RigidMotion<D>)| {
-            format!("{} of {}", motion.in_words(), self.bodies[body].part.spec.name.value)
+            format!("{} of {}", motion.in_words(), self.bodies[body].spec.name.value)
         };
         few(each.map(name)).join(", ")
     }
@@ -412,7 +412,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
         };
         let mut balance = Balance::new(all.len());
         for (number, body) in self.bodies.iter().enumerate() {
-            let (mesh, motions) = (&body.part.mesh, of_body(number));
+            let (mesh, motions) = (&body.mesh, of_body(number));
             mesh.load.iter().for_each(|(node, force)| balance.add(force, &moved(mesh, &motions, node)));
         }
         let amounts = balance.amounts(&works);
@@ -430,8 +430,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
         let mut amounts = moving.amounts;
         for pin in pins.iter() {
             let there = self.moving(amounts.clone());
-            let value =
-                there.of(pin.body).map_or(0.0, |motion| self.bodies[pin.body].part.mesh.dof_of(motion, pin.dof));
+            let value = there.of(pin.body).map_or(0.0, |motion| self.bodies[pin.body].mesh.dof_of(motion, pin.dof));
             amounts -= value * &pin.amounts;
         }
         let moving = self.moving(amounts);
@@ -532,10 +531,10 @@ struct Pin {
 
 impl<const D: usize> GroupMotion<D> {
     /// Return the work of the loads on the motion, and the largest work that forces of their magnitudes could do.
-    fn works(&self, bodies: &[WholeBody<D>]) -> [f64; 2] {
+    fn works(&self, bodies: &[SceneBody<D>]) -> [f64; 2] {
         let mut sums = [0.0; 2];
         for (&body, motion) in self.bodies.iter().zip(&self.motions) {
-            let works = bodies[body].load.works(|node| bodies[body].part.mesh.at_dofs(motion, node));
+            let works = bodies[body].works(motion);
             (0..2).for_each(|k| sums[k] += works[k]);
         }
         sums

@@ -14,7 +14,7 @@
 
 use super::approach::mean_normal;
 use super::groups::point;
-use super::whole_body::NO_WORK;
+use super::scene_body::NO_WORK;
 use crate::contact::{ContactPair, Measure};
 use crate::error::{Error, Result};
 use crate::fem::cross;

@@ -3,7 +3,7 @@
 
 use super::body_mesh::BodyMesh;
 use super::owned_dofs::OwnedDofs;
-use super::whole_body::WholeBody;
+use super::scene_body::SceneBody;
 use crate::contact::ContactPair;
 use crate::exchange::Serial;
 use crate::fem::{NodalBlock, Space, place};
@@ -83,27 +83,27 @@ impl Partition {
     /// `wants_coarse(body)` returns whether a body is interpolated from its coarse nodes.
     pub fn new<const D: usize>(
         set: Vec<usize>,
-        bodies: &[WholeBody<D>],
+        bodies: &[SceneBody<D>],
         pairs: &[ContactPair],
         ranks: usize,
         wants_coarse: &dyn Fn(usize) -> bool,
     ) -> Self {
-        let nodes_of = |body: usize| &bodies[body].part.mesh.space.nodes;
+        let nodes_of = |body: usize| &bodies[body].mesh.space.nodes;
         let places: Vec<[f64; D]> = set.iter().flat_map(|&body| nodes_of(body).iter().copied()).collect();
         let mut all = bisect(&places, &couplings(bodies, &set, pairs), ranks).into_iter();
         let of_body = |&body: &usize| all.by_ref().take(nodes_of(body).len()).collect();
         let mut owner: Vec<Vec<u32>> = set.iter().map(of_body).collect();
         for (owner, &body) in owner.iter_mut().zip(&set) {
-            for [pole, master] in bodies[body].part.mesh.held.frame.poles() {
+            for [pole, master] in bodies[body].mesh.held.frame.poles() {
                 owner[pole as usize] = owner[master as usize];
             }
         }
         let coarse_nodes =
-            |&body: &usize| if wants_coarse(body) { bodies[body].part.mesh.coarse_nodes() } else { Vec::new() };
+            |&body: &usize| if wants_coarse(body) { bodies[body].mesh.coarse_nodes() } else { Vec::new() };
         let coarse: Vec<Vec<u32>> = set.iter().map(coarse_nodes).collect();
         let nodes = Numbers::new(&owner, ranks, |_, _| true);
         let coarse = Numbers::new(&owner, ranks, |body, node| coarse[body].binary_search(&node).is_ok());
-        let products = set.iter().map(|&body| bodies[body].part.mesh.products()).collect();
+        let products = set.iter().map(|&body| bodies[body].mesh.products()).collect();
         Self { bodies: set, ranks, owner, nodes, coarse, products }
     }
 
@@ -239,11 +239,11 @@ impl Partition {
 /// Return, for each node of the bodies in `set`, the number of nodes with which it is coupled in a matrix of all of
 /// them, itself included. Nodes are coupled by the cells around them and by contact rows. The result runs over one body
 /// after the other.
-fn couplings<const D: usize>(bodies: &[WholeBody<D>], set: &[usize], pairs: &[ContactPair]) -> Vec<u32> {
+fn couplings<const D: usize>(bodies: &[SceneBody<D>], set: &[usize], pairs: &[ContactPair]) -> Vec<u32> {
     let (mut first, mut all) = (HashMap::new(), Vec::new());
     for &body in set {
         first.insert(body, all.len());
-        all.extend(bodies[body].part.mesh.graph().ptr.windows(2).map(|ends| ends[1] - ends[0]));
+        all.extend(bodies[body].mesh.graph().ptr.windows(2).map(|ends| ends[1] - ends[0]));
     }
     for pair in pairs.iter().filter(|pair| pair.bodies.iter().all(|body| first.contains_key(body))) {
         let nodes = |side: usize, q: usize| pair.rows[side].row(q).map(|(dof, _)| (dof / D) as u32);

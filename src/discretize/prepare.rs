@@ -9,9 +9,8 @@ use super::kept::{EarlierPair, Kept, MatrixInputs};
 use super::meshes::{KeptMeshes, Meshes};
 use super::pairs::{self, Contact, ContactFacts, Contacts};
 use super::partition::Partition;
-use super::scene_body::parts;
+use super::scene_body::{SceneBody, parts};
 use super::verify::Verified;
-use super::whole_body::WholeBody;
 use super::{chords, mechanism, obstacle};
 use crate::contact::pieces::Cut;
 use crate::contact::{self, ContactPair};
@@ -63,7 +62,9 @@ pub struct ReplicatedProblem<const D: usize, P> {
 
 /// All bodies before their matrices are assembled, with the ranks that own their nodes.
 pub struct WholeProblem<'a, const D: usize> {
-    bodies: Vec<WholeBody<'a, D>>,
+    bodies: Vec<SceneBody<'a, D>>,
+    /// Owner rank of each body, and all ranks that own nodes of it.
+    owners: Vec<(usize, Vec<usize>)>,
     partitions: Vec<Rc<Partition>>,
     /// Whether every rank keeps all meshes, for an estimate of the error.
     keep: bool,
@@ -72,16 +73,16 @@ pub struct WholeProblem<'a, const D: usize> {
 impl<const D: usize> WholeProblem<'_, D> {
     /// Return everything, for the only rank.
     pub fn into_locals(self) -> Vec<Option<BodyMesh<D>>> {
-        self.bodies.into_iter().map(|body| Some(body.part.mesh)).collect()
+        self.bodies.into_iter().map(|body| Some(body.mesh)).collect()
     }
 
     /// Return what a rank receives of each body.
     pub fn on(&self, rank: usize) -> Vec<Option<BodyMesh<D>>> {
-        let of_body = |(index, body): (usize, &WholeBody<D>)| {
-            let is_owned = body.owner == rank;
+        let of_body = |(index, body): (usize, &SceneBody<D>)| {
+            let is_owned = self.owners[index].0 == rank;
             match place_of(&self.partitions, index) {
-                Some((partition, number)) => Some(partition.restrict(&body.part.mesh, number, rank, self.keep)),
-                None => (is_owned || self.keep).then(|| BodyMesh { is_owned, ..body.part.mesh.clone() }),
+                Some((partition, number)) => Some(partition.restrict(&body.mesh, number, rank, self.keep)),
+                None => (is_owned || self.keep).then(|| BodyMesh { is_owned, ..body.mesh.clone() }),
             }
         };
         self.bodies.iter().enumerate().map(of_body).collect()
@@ -111,10 +112,10 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     let keep = keep.is_some();
     let mesh = &verified.mesh;
     let mut before = std::mem::take(kept);
-    let parts = parts(scene, verified, &before.spaces())?;
-    kept.bodies = parts.iter().map(MatrixInputs::of).collect();
+    let mut bodies = parts(scene, verified, &before.spaces())?;
+    kept.bodies = bodies.iter().map(MatrixInputs::of).collect();
     let earlier_pairs = before.serving_pairs(&kept.bodies, pairs);
-    let Contacts { all, searched } = pairs::all(scene, mesh, cut, &parts, keep, earlier_pairs)?;
+    let Contacts { all, searched } = pairs::all(scene, mesh, cut, &bodies, keep, earlier_pairs)?;
     let (mut pairs, mut contacts, mut fine) = (Vec::new(), Vec::new(), Vec::new());
     for Contact { pair, facts, inputs } in all {
         pairs.push(pair);
@@ -122,8 +123,8 @@ pub fn prepare<'a, const D: usize, F: Factory>(
         fine.extend(inputs.fine.clone());
         kept.pairs.push(inputs);
     }
-    let lack = chords::lack(&parts, mesh)?;
-    let mut bodies = WholeBody::all(parts, &pairs, mesh)?;
+    let lack = chords::lack(&bodies, mesh)?;
+    SceneBody::complete(&mut bodies, &pairs, mesh)?;
     let mechanisms = mechanism::fix(&mut bodies, &mut pairs, lack);
     let is_through: Vec<bool> = kept.pairs.iter().map(|inputs| inputs.is_through).collect();
     let rigid = obstacle::all(scene, &mut pairs, &is_through, bodies.len())?;
@@ -134,17 +135,14 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     let plan = plan(&bodies, &verified.checked, factory, &mut is_kept)?;
     kept.partitions = partitions(&bodies, &pairs, factory, ranks, (before.partitions, &is_kept));
     kept.owners = owners(&bodies, &kept.partitions, ranks);
-    for (index, (owner, ranks)) in kept.owners.iter().enumerate() {
-        let body = &mut bodies[index];
-        (body.owner, body.ranks) = (*owner, ranks.clone());
-        is_kept[index] &= before.owners.get(index) == Some(&kept.owners[index]);
-    }
+    is_kept.iter_mut().enumerate().for_each(|(i, is_kept)| *is_kept &= before.owners.get(i) == Some(&kept.owners[i]));
     kept.rules = scene.rules().cloned().collect();
-    let checked = bodies.iter().zip(&*verified.checked);
-    let shared = checked.map(|(body, checked)| body.shared(&pairs, checked, scene.plane)).collect();
+    let facts = bodies.iter().zip(&*verified.checked).zip(&kept.owners);
+    let shared = facts.map(|((body, checked), owners)| body.shared(&pairs, checked, scene.plane, owners)).collect();
     let shared =
         ReplicatedProblem { bodies: shared, pairs, rigid, contacts, mechanisms, fine, plan, is_kept, searched };
-    Ok((shared, WholeProblem { bodies, partitions: kept.partitions.clone(), keep }))
+    let (owners, partitions) = (kept.owners.clone(), kept.partitions.clone());
+    Ok((shared, WholeProblem { bodies, owners, partitions, keep }))
 }
 
 /// Return the factory's plan of the solvers of all bodies. `is_kept` says whether each has the matrix of the problem
@@ -153,13 +151,12 @@ pub fn prepare<'a, const D: usize, F: Factory>(
 /// # Errors
 /// See [`Factory::plan`].
 fn plan<const D: usize, F: Factory>(
-    bodies: &[WholeBody<D>],
+    bodies: &[SceneBody<D>],
     checked: &[BodyCheck],
     factory: &mut F,
     is_kept: &mut [bool],
 ) -> Result<F::SolverPlan> {
-    let of_body = |(WholeBody { part, .. }, checked): (&WholeBody<D>, &BodyCheck)| {
-        let (spec, mesh) = (part.spec, &part.mesh);
+    let of_body = |(SceneBody { spec, mesh, .. }, checked): (&SceneBody<D>, &BodyCheck)| {
         let rigid_modes = mesh.rigid_modes();
         let at = |k: usize, dof: usize| mesh.dof_of(&rigid_modes[k], dof);
         let motions = AtDofs { count: rigid_modes.len(), at: &at };
@@ -181,13 +178,13 @@ fn plan<const D: usize, F: Factory>(
 /// Distribute the nodes of the bodies that share a matrix over the ranks, by the factory's plan. `kept` are the
 /// partitions of the problem before, with the bodies that have the same matrices.
 fn partitions<const D: usize>(
-    bodies: &[WholeBody<D>],
+    bodies: &[SceneBody<D>],
     pairs: &[ContactPair],
     factory: &impl Factory,
     ranks: usize,
     kept: (Vec<Rc<Partition>>, &[bool]),
 ) -> Vec<Rc<Partition>> {
-    let wants_coarse = |body: usize| factory.wants_interpolation(&bodies[body].part.spec.name.value);
+    let wants_coarse = |body: usize| factory.wants_interpolation(&bodies[body].spec.name.value);
     let partition = |set: Vec<usize>| {
         let serves = |partition: &&Rc<Partition>| partition.bodies == set && set.iter().all(|&body| kept.1[body]);
         match kept.0.iter().find(serves) {
@@ -201,11 +198,11 @@ fn partitions<const D: usize>(
 /// Return for each body the rank that owns it or most of it, and all ranks that own nodes of it. A body that is not
 /// distributed stays whole; such bodies are assigned so that all ranks get about equally many of their dofs.
 fn owners<const D: usize>(
-    bodies: &[WholeBody<D>],
+    bodies: &[SceneBody<D>],
     partitions: &[Rc<Partition>],
     ranks: usize,
 ) -> Vec<(usize, Vec<usize>)> {
-    let dofs = |body: usize| if place_of(partitions, body).is_some() { 0 } else { bodies[body].part.mesh.space.dofs() };
+    let dofs = |body: usize| if place_of(partitions, body).is_some() { 0 } else { bodies[body].mesh.space.dofs() };
     let owners = crate::parallel::owners(&(0..bodies.len()).map(dofs).collect::<Vec<_>>(), ranks);
     let of_body = |(body, owner): (usize, usize)| match place_of(partitions, body) {
         Some((partition, number)) => (partition.leader(number), partition.ranks(number)),

@@ -1,28 +1,34 @@
-//! The bodies of the scene on its mesh: space, elasticity, supports, loads, stiffness. Errors name body and place.
+//! The bodies of the scene on its mesh: space, elasticity, supports, loads, and the rigid motions that supports leave.
+//! Errors name body and place.
 
+use super::approach;
 use super::body_mesh::BodyMesh;
 use super::groups::{FieldValues, Line, find_group, not_on_body, of_body, point, without_area};
 use super::supports::{Constraints, moment_load, spring_blocks};
 use super::verify::Verified;
-use crate::contact::Side;
+use crate::contact::{ContactPair, Side};
 use crate::error::{Error, Result, shown};
 use crate::expression::Field;
 use crate::fem::elasticity::Flaw;
-use crate::fem::{
-    ElasticBody, Elasticity, Facets, NodalForces, NodeGraph, PointExtent, Space, assemble, support, surface,
-};
-use crate::linalg::{Csr, Total, countable};
+use crate::fem::{Elasticity, Facets, NodalForces, PointExtent, RigidMotion, Space, assemble, surface};
+use crate::linalg::{Csr, PART, Total};
 use crate::mesh::{self, Group, Mesh};
+use crate::model::{Motion, Segment};
 use crate::problem::{BodySpec, Constants, ElasticitySpec, Order, Plane};
 use crate::problem::{Load, LoadKind};
 use crate::scene::Scene;
 use std::cell::OnceCell;
+use std::collections::HashSet;
 use std::rc::Rc;
+
+/// Share of the largest possible work below which the work of the loads is rounding: the sum of a million works, each
+/// rounded by 1e-16 of it, is rounded by 1e-10 at most.
+pub const NO_WORK: f64 = 1e-9;
 
 /// Poisson's ratio above which linear elements lock.
 const LOCKING: f64 = 0.49;
 
-/// A body of the scene on its mesh.
+/// A body of the scene on its mesh: whole, on the first rank, before its matrix is assembled.
 #[derive(Clone)]
 pub struct SceneBody<'a, const D: usize> {
     /// Description in the scene.
@@ -31,6 +37,10 @@ pub struct SceneBody<'a, const D: usize> {
     pub elasticity: Rc<Elasticity>,
     /// Nodes, and all that is tied to them.
     pub mesh: BodyMesh<D>,
+    /// Its contact rows, pair by pair, once pairs are known.
+    pub segments: Vec<Segment>,
+    /// Forces of all loads at dofs, once pairs are known.
+    pub dof_load: NodalForces<D>,
 }
 
 impl<'a, const D: usize> SceneBody<'a, D> {
@@ -162,34 +172,88 @@ impl<'a, const D: usize> SceneBody<'a, D> {
         })
     }
 
-    /// Assemble K on its graph, with f and the supports. If the graph has the rows of some nodes only, so have K and f.
-    pub fn assemble(
-        &self,
-        mesh: &Mesh<D>,
-        graph: &NodeGraph,
-        mut load: Vec<f64>,
-        prescribed: Vec<(usize, f64)>,
-    ) -> Result<ElasticBody> {
-        let name = &self.spec.name;
-        countable(&format!("the stiffness matrix of body `{}`", name.value), graph.entries::<D>())?;
-        let mut stiffness = assemble::stiffness(&self.mesh.space, graph, &self.mesh.held.frame, &self.elasticity)
-            .map_err(|defect| match defect {
-                assemble::Defect::Inverted(cell) => {
-                    let corner = self.mesh.space.in_scene(self.mesh.space.cell_nodes(cell)[0]);
-                    let message = format!("body `{}`: the curved cell at {} is folded", name.value, point(corner));
-                    Error::mesh(&mesh.path, None, message).help("refine the mesh there, or use order = 1")
-                }
-                assemble::Defect::Elasticity(number, x, flaw) => refusal(self.spec, number, Some(x), &flaw),
-            })?;
-        if (0..stiffness.rows()).any(|row| stiffness.row(row).any(|(_, k)| !k.is_finite())) {
-            let message = format!("body `{}`: its stiffness is beyond the range of numbers", name.value);
-            return Err(Error::scene(&self.spec.elasticity().place, message).label("far too large"));
+    /// Complete all bodies by their contact rows, their loads and the motions that supports leave.
+    ///
+    /// # Errors
+    /// See [`SceneBody::load`].
+    pub fn complete(all: &mut [Self], pairs: &[ContactPair], mesh: &Mesh<D>) -> Result<()> {
+        let count = all.len();
+        for (pair, sides) in pairs.iter().enumerate() {
+            for (side, &body) in sides.bodies.iter().enumerate().filter(|(_, body)| **body < count) {
+                all[body].segments.push(Segment { pair, side });
+            }
         }
-        let frame = &self.mesh.held.frame;
-        self.mesh.springs.iter().for_each(|springs| assemble::add_blocks(graph, frame, springs, &mut stiffness));
-        // These rows belong to other ranks.
-        (0..load.len()).filter(|&i| stiffness.range(i).is_empty()).for_each(|i| load[i] = 0.0);
-        Ok(support(stiffness, load, prescribed))
+        for body in all {
+            body.mesh.approach = approach::rows(body, &body.segments, pairs, mesh)?;
+            body.mesh.load = body.load(mesh)?;
+            body.mesh.find_motions();
+            body.dof_load = body.mesh.load_on_dofs();
+            body.collect_rows(pairs);
+        }
+        Ok(())
+    }
+
+    /// Collect the contact rows of the body.
+    pub fn collect_rows(&mut self, pairs: &[ContactPair]) {
+        let rows = |of: fn(&ContactPair) -> &[Csr; 2]| {
+            let mut all = Csr::new(self.mesh.space.dofs());
+            for &Segment { pair, side } in &self.segments {
+                (0..pairs[pair].len()).for_each(|q| all.push_row(of(&pairs[pair])[side].row(q)));
+            }
+            all
+        };
+        (self.mesh.rows, self.mesh.nodal_rows) = (rows(|pair| &pair.rows), rows(|pair| &pair.nodal));
+    }
+
+    /// Return the motions that supports leave, as traces on the contact rows and works of the loads.
+    pub fn motions(&self) -> Vec<Motion> {
+        let of = |motion: &RigidMotion<D>| Motion {
+            name: motion.name.clone(),
+            trace: self.trace(motion),
+            work: self.work(motion),
+        };
+        self.mesh.motions.iter().map(of).collect()
+    }
+
+    /// Return the trace of a motion on the contact rows.
+    pub fn trace(&self, motion: &RigidMotion<D>) -> Vec<f64> {
+        let row = |q: usize| self.mesh.rows.row(q).map(|(dof, b)| b * self.mesh.dof_of(motion, dof)).sum();
+        (0..self.mesh.rows.rows()).map(row).collect()
+    }
+
+    /// Return the work of the loads on a motion, and the largest work that forces of their magnitudes could do.
+    pub fn works(&self, motion: &RigidMotion<D>) -> [f64; 2] {
+        self.dof_load.works(|node| self.mesh.at_dofs(motion, node))
+    }
+
+    /// Return the work of the loads on a motion. It is exactly zero where it is rounding.
+    pub fn work(&self, motion: &RigidMotion<D>) -> f64 {
+        let [work, largest] = self.works(motion);
+        if work.abs() <= NO_WORK * largest { 0.0 } else { work }
+    }
+
+    /// Change each nodal force to what `changed` returns for its node.
+    pub fn change_loads(&mut self, changed: impl Fn(&BodyMesh<D>, u32, [f64; D]) -> [f64; D]) {
+        let mesh = &self.mesh;
+        let load = mesh.load.iter().map(|(node, force)| (node, changed(mesh, node, force))).collect();
+        self.mesh.load = load;
+        self.dof_load = self.mesh.load_on_dofs();
+    }
+
+    /// Return the dof at which a motion can be fixed, and its displacement there. It is the one that the motion moves
+    /// most, the last one of equal ones, outside the contact rows so that these do not change. The result is `None` if
+    /// that displacement is rounding.
+    pub fn candidate(&self, motion: &RigidMotion<D>) -> Option<(usize, f64)> {
+        let in_rows: HashSet<usize> = self.mesh.rows.col.iter().map(|&dof| dof as usize).collect();
+        let is_free = |dof: &usize| !in_rows.contains(dof) && !self.mesh.held.prescribed.contains_key(dof);
+        let all = (0..self.mesh.space.dofs()).filter(is_free);
+        let sizes = all.map(|dof| (dof, self.mesh.dof_of(motion, dof)));
+        sizes.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).filter(|found| found.1.abs() > PART)
+    }
+
+    /// Fix a dof. The motions of the body are not found anew.
+    pub fn fix(&mut self, dof: usize) {
+        self.mesh.held.prescribed.insert(dof, 0.0);
     }
 }
 
@@ -264,7 +328,8 @@ pub fn parts<'a, const D: usize>(
             is_owned: true,
             graph: OnceCell::new(),
         };
-        parts.push(SceneBody { spec, elasticity: Rc::new(elasticity), mesh });
+        let (elasticity, dof_load) = (Rc::new(elasticity), NodalForces::default());
+        parts.push(SceneBody { spec, elasticity, mesh, segments: Vec::new(), dof_load });
     }
     Ok(parts)
 }
@@ -345,7 +410,7 @@ fn constants(spec: &BodySpec) -> impl Iterator<Item = ElasticitySpec> {
 
 /// Return the error of the constants of a body (`number` 0) or of one of its regions. The point is given if the
 /// constants depend on it.
-fn refusal(spec: &BodySpec, number: usize, x: Option<[f64; 3]>, flaw: &Flaw) -> Error {
+pub fn refusal(spec: &BodySpec, number: usize, x: Option<[f64; 3]>, flaw: &Flaw) -> Error {
     let elasticity = constants(spec).nth(number).unwrap_or_else(|| spec.elasticity());
     let place = &elasticity.place;
     let fields = elasticity.fields();
