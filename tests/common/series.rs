@@ -85,17 +85,20 @@ impl Series {
         panic!("the series do not converge");
     }
 
-    /// Pressures at places x, y with these gaps. What the faces yield is smooth: the layer has the pressure between the points of
-    /// the series, too.
-    pub fn at(&self, x: &[f64], y: &[f64], gap: impl Fn(f64, f64) -> f64) -> Vec<f64> {
+    /// Depths by which both faces together yield at places x, y.
+    pub fn depths(&self, x: &[f64], y: &[f64]) -> Vec<f64> {
         let scaled = |x: &[f64]| x.iter().map(|x| x / self.boxes.side).collect::<Vec<f64>>();
         let (of_x, of_y) = (waves(self.boxes.points, &scaled(x)), waves(self.boxes.points, &scaled(y)));
         let yields = of_x.tr_mul(&self.depth);
-        let pressure = |q: usize| {
-            let depth = (yields.row(q) * of_y.column(q))[0];
-            self.boxes.stiffness * (self.boxes.approach - gap(x[q], y[q]) - depth).max(0.0)
-        };
-        (0..x.len()).map(pressure).collect()
+        (0..x.len()).map(|q| (yields.row(q) * of_y.column(q))[0]).collect()
+    }
+
+    /// Pressures at places x, y with these gaps. What the faces yield is smooth: the layer has the pressure between the points of
+    /// the series, too.
+    pub fn at(&self, x: &[f64], y: &[f64], gap: impl Fn(f64, f64) -> f64) -> Vec<f64> {
+        let pressure =
+            |(q, depth): (usize, f64)| self.boxes.stiffness * (self.boxes.approach - gap(x[q], y[q]) - depth).max(0.0);
+        self.depths(x, y).into_iter().enumerate().map(pressure).collect()
     }
 }
 

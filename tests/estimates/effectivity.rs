@@ -92,3 +92,19 @@ fn estimates_are_of_the_size_of_errors() {
     let ratios = crate::common::here::with_session(|session| rows(session).expect("all rows"));
     assert!(ratios.len() == 8 && ratios.iter().all(|ratio| (0.7..2.0).contains(ratio)), "{ratios:?}");
 }
+
+/// The reference of the scene, by which `bench` measures errors, is the exact pressure to 2e-5 of its largest value, 92 MPa.
+#[test]
+fn the_reference_of_the_paraboloid_is_its_series() {
+    let scene = load(&Path::new("meshes/paraboloid/scene.toml"), &[]).expect("a scene");
+    let gap = |x: f64, y: f64| 4e-3 * (x * x + y * y);
+    let boxes =
+        Boxes { side: 0.5, height: 0.5, young: 2.1e5, poisson: 0.3, stiffness: 1e6, approach: 3e-4, points: 128 };
+    let (x, y): (Vec<f64>, Vec<f64>) =
+        (0..400).map(|i| (0.5 * f64::from(i) / 400.0, 0.5 * f64::from(i * 7 % 400) / 400.0)).unzip();
+    let reference = scene.contacts[0].reference.as_ref().expect("a reference");
+    let exact = Series::new(boxes, gap).at(&x, &y, gap);
+    let error = |q: usize| (reference.eval([x[q], y[q], 0.0]) - exact[q]).abs();
+    let worst = (0..x.len()).map(error).fold(0.0, f64::max);
+    assert!(exact.iter().any(|p| *p > 90.0) && worst < 2e-3, "{worst}");
+}
