@@ -197,6 +197,15 @@ impl Discrete {
         model.set_gaps();
     }
 
+    /// Let the layers that remember have had compressions up to `largest`, n; empty for none.
+    pub fn remember(&mut self, largest: &[f64]) {
+        let model = &mut self.model;
+        for i in (0..model.pairs.len()).filter(|_| !largest.is_empty()) {
+            let range = model.range(i);
+            model.pairs[i].law.remember(&largest[range]);
+        }
+    }
+
     /// Begin another run with the bodies of this problem: its counters start at zero.
     pub fn begin_anew(&mut self) {
         (self.assemblies, self.pairings) = (0, 0);

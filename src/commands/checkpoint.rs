@@ -27,7 +27,7 @@ pub const FILE: &str = "checkpoint";
 pub const ASIDE: &str = "checkpoint.old";
 
 /// The first line.
-const FORMAT: &str = "winkler checkpoint 8";
+const FORMAT: &str = "winkler checkpoint 9";
 
 /// The beginning of the first line in all versions.
 const ANY_FORMAT: &[u8] = b"winkler checkpoint ";
@@ -64,6 +64,8 @@ pub struct Checkpoint {
     trace: Vec<f64>,
     /// Compressions of the layers' states, n.
     compression: Vec<f64>,
+    /// Largest compressions so far, n; empty if no layer remembers.
+    largest: Vec<f64>,
 }
 
 impl Checkpoint {
@@ -80,7 +82,7 @@ impl Checkpoint {
         let head = CheckpointHeader { problem: problem_digest(scene, &done.built), steps, ..head };
         let failed = |cause: String| Error::new(Kind::File, "the checkpoint cannot be written").because(cause);
         let json = serde_json::to_string(&head).map_err(|cause| failed(cause.to_string()))?;
-        let numbers = (&done.outcome.iterate.trace, &done.outcome.layer.compression);
+        let numbers = (&done.outcome.iterate.trace, &done.outcome.layer.compression, &done.largest);
         let mut bytes = postcard::to_extend(&numbers, format!("{FORMAT}\n{json}\n").into_bytes())
             .map_err(|cause| failed(cause.to_string()))?;
         let sum = Sha256::digest(&bytes);
@@ -123,9 +125,9 @@ impl Checkpoint {
                         `[method]` without its `steps` may change. Or begin anew, without `--restart`";
             return Err(Error::new(Kind::Scene, message).help(help));
         }
-        let Self { head, trace, compression, .. } = self;
+        let Self { head, trace, compression, largest, .. } = self;
         let solution = Solution { field: Field { trace, ..Field::default() }, compression };
-        Ok(Begin { start: Some(InitialGuess::Known(Box::new(solution))), steps: head.steps })
+        Ok(Begin { start: Some(InitialGuess::Known(Box::new(solution))), steps: head.steps, largest })
     }
 }
 
@@ -135,8 +137,8 @@ fn parse(path: &Path, bytes: &[u8]) -> Option<Checkpoint> {
     let mut lines = text.splitn(3, |&byte| byte == b'\n');
     let is_ours = lines.next()? == FORMAT.as_bytes() && Sha256::digest(text)[..] == *digest;
     let head: CheckpointHeader = serde_json::from_slice(lines.next()?).ok().filter(|_| is_ours)?;
-    let (trace, compression) = postcard::from_bytes(lines.next()?).ok()?;
-    Some(Checkpoint { path: path.to_owned(), head, trace, compression })
+    let (trace, compression, largest) = postcard::from_bytes(lines.next()?).ok()?;
+    Some(Checkpoint { path: path.to_owned(), head, trace, compression, largest })
 }
 
 /// Return a digest of a scene without output, solvers and method (but for its load steps), of the file of the mesh, and

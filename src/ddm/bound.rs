@@ -61,7 +61,8 @@ pub(super) fn surface_energy(model: &Model, layer: &Layer) -> f64 {
 
 /// Return the compression within c -+ `roundoff` at which the pressure of a law is nearest to p.
 fn nearest(law: &Law, point: usize, c: f64, roundoff: f64, p: f64) -> f64 {
-    let difference = if p > 0.0 || law.is_bonded() { law.compression(point, p) - c } else { c.min(0.0) - c };
+    let difference =
+        if p > 0.0 || law.is_bonded() { law.compression(point, p) - c } else { c.min(law.rest(point)) - c };
     if difference.is_finite() { c + difference.clamp(-roundoff, roundoff) } else { c }
 }
 

@@ -59,6 +59,11 @@ impl Status {
     pub fn is_solved(&self) -> bool {
         matches!(self, Status::Converged | Status::RoundoffLimited)
     }
+
+    /// Return whether other runs can begin with the result: a solution, or what a limit of iterations has left.
+    pub fn is_usable(&self) -> bool {
+        self.is_solved() || *self == Self::IterationLimit
+    }
 }
 
 /// Return the paper's rho: the norm of the increment of normal displacements over the norm of the displacements. Zero

@@ -23,7 +23,7 @@ pub struct Layer {
     pub energy: Vec<f64>,
     /// sum omega p c over all pairs.
     pub work: f64,
-    /// Number of points with c > 0.
+    /// Number of points with c > 0, and more than the compression that stays without pressure.
     pub closed: usize,
     /// mu, n: energy per area by which the laws are smoothed ([`Law::resolve`](crate::contact::law::Law::resolve)); empty for the laws themselves. With
     /// smoothed laws `energy` is zero.
@@ -41,6 +41,7 @@ impl Layer {
                 let (pressure, tangent) = pair.law.pressure_and_tangent(point, c);
                 energy += model.area[q] * pair.law.energy(point, c);
                 layer.push(model.area[q], c, pressure, tangent);
+                layer.closed += usize::from(c > pair.law.rest(point));
             }
             layer.energy.push(energy);
         }
@@ -52,7 +53,6 @@ impl Layer {
         let force = area * pressure;
         // zero force does no work, even where the gap is infinite
         self.work += if force == 0.0 { 0.0 } else { force * compression };
-        self.closed += usize::from(compression > 0.0);
         self.compression.push(compression);
         self.pressure.push(pressure);
         self.tangent.push(tangent);
@@ -79,6 +79,7 @@ impl Layer {
         for (q, pair, point) in model.each_point() {
             let state = pair.law.resolve(point, sum(q), rho[q], smoothing[q]);
             layer.push(model.area[q], state.compression, state.pressure, state.tangent);
+            layer.closed += usize::from(state.compression > pair.law.rest(point));
         }
         layer
     }

@@ -305,6 +305,8 @@ pub struct ContactTable {
     pub gap: Vec<f64>,
     /// Compression c of the layer; negative where the layer is open.
     pub compression: Vec<f64>,
+    /// Largest compression in all load steps; empty unless the layer remembers it.
+    pub compression_max: Vec<f64>,
     /// Contact pressure p(c), >= 0.
     pub pressure: Vec<f64>,
     /// Averaged normal displacement of side a and of side b, each along its own outer normal.
@@ -327,7 +329,11 @@ impl ContactTable {
             (&name_a, &self.displacement[0]),
             (&name_b, &self.displacement[1]),
         ];
-        let optional: [(&str, &[f64]); 2] = [("pressure_error", &self.pressure_error), ("face", &self.face)];
+        let optional: [(&str, &[f64]); 3] = [
+            ("compression_max", &self.compression_max),
+            ("pressure_error", &self.pressure_error),
+            ("face", &self.face),
+        ];
         columns.extend(optional.into_iter().filter(|(_, values)| !values.is_empty()));
         let mut csv = csv::Writer::from_writer(out);
         csv.write_record(["x", "y", "z"].into_iter().chain(columns.iter().map(|(name, _)| *name)))?;

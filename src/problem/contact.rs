@@ -4,7 +4,7 @@ use super::body::{check_name, plain_pattern};
 use super::check::{Check, Fault, positive};
 use super::compile::{Compile, Names, compile};
 use super::geometry::{Geometry, Plane};
-use super::layer::LayerSpec;
+use super::layer::{LayerSpec, UnloadSpec};
 use super::load::one;
 use super::pattern;
 use super::read::{Either, Form, OneOrVector, Vector, check_numbers, refused, some_table, table};
@@ -77,6 +77,13 @@ pub struct ContactSpec {
     /// law of a bonded layer where it is stretched: tension over stretch
     #[serde(default, deserialize_with = "some_table")]
     pub tension: Option<LayerSpec>,
+    /// law by which the pressure falls where a load step takes load off the layer, over the way back from its largest
+    /// compression
+    ///
+    /// The law of the layer itself without this key. A table has rows of a compression, a pressure and the slope of
+    /// unloading from there.
+    #[serde(default, deserialize_with = "some_table")]
+    pub unload: Option<UnloadSpec>,
     /// whether the surface `on` is before a rigid obstacle, which is given by the gap
     #[serde(default)]
     pub obstacle: bool,
@@ -141,6 +148,7 @@ impl ContactSpec {
             touching: false,
             bond: false,
             tension: None,
+            unload: None,
             obstacle: false,
             approach: None,
             tilt: None,
@@ -271,7 +279,7 @@ pub enum Overlap {
     Refuse,
 }
 
-compile!(ContactSpec { between, on, of, layer, tension, at, path, reference } else {
+compile!(ContactSpec { between, on, of, layer, tension, unload, at, path, reference } else {
     gap, approach, force, tilt, moment, distance, angle, edge, touching, bond, obstacle, preload, overlap, table, factor
 } then compile_steps);
 

@@ -36,6 +36,52 @@ pub enum LayerSpec {
     },
 }
 
+/// How a layer is unloaded from its largest compression so far.
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(try_from = "LayerKeys", untagged)]
+pub enum UnloadSpec {
+    /// By this law of the way back and of how far the pressure has fallen.
+    Law(LayerSpec),
+    /// Along straight lines, by points (compression, pressure, slope) of the law: the slope depends on the largest
+    /// pressure so far.
+    Slopes(Vec<[f64; 3]>),
+}
+
+impl Compile for UnloadSpec {
+    fn compile(&mut self, names: &Names<'_>) -> Checked<()> {
+        match self {
+            Self::Law(law) => law.compile(names),
+            Self::Slopes(_) => Ok(()),
+        }
+    }
+}
+
+impl Check for UnloadSpec {
+    fn check(&self, geometry: Geometry) -> Result<(), Fault> {
+        match self {
+            Self::Law(law) => law.check(geometry),
+            Self::Slopes(rows) => {
+                check_table(&rows.iter().map(|&[c, p, _]| [c, p]).collect::<Vec<_>>())?;
+                rows.iter().try_for_each(|[_, _, slope]| positive("table", "a slope of unloading", *slope))
+            }
+        }
+    }
+}
+
+impl TryFrom<LayerKeys> for UnloadSpec {
+    type Error = Refusal;
+
+    /// Tables have two columns, as those of a layer, or three.
+    fn try_from(keys: LayerKeys) -> Result<Self, Refusal> {
+        let rows = keys.table.iter().flat_map(|table| &table.value);
+        let rows: Option<Vec<[f64; 3]>> = rows.map(|row| row.value[..].try_into().ok()).collect();
+        match rows.filter(|rows| !rows.is_empty()) {
+            Some(rows) => Ok(Self::Slopes(rows)),
+            None => LayerSpec::try_from(keys).map(Self::Law),
+        }
+    }
+}
+
 /// The parameters of the power law.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

@@ -6,7 +6,7 @@ use super::meshed::{self, MeshFacts, SceneMesh};
 use super::stages::{Before, Begin, Built, Clock, Done, Prepared};
 use super::warnings;
 use crate::ddm::gamma;
-use crate::ddm::{InitialGuess, Method, Outcome, Status, first_springs};
+use crate::ddm::{InitialGuess, Method, Outcome, first_springs};
 use crate::discretize::{self, Discrete};
 use crate::error::Result;
 use crate::estimate::{self, Estimate};
@@ -76,6 +76,7 @@ pub fn build_after(
 pub fn next_step(done: Done, mut start: Option<InitialGuess>, clock: &mut Clock) -> Result<Prepared> {
     let step = done.steps.len();
     let (scene, steps, earlier) = (done.built.scene.clone(), done.steps.clone(), done.earlier.clone());
+    let largest = done.largest.clone();
     let (mut known, mut warnings) = (done.built.warnings.clone(), done.warnings.clone());
     let (Some(mesh), before) = done.into_mesh() else { unreachable!("a history keeps its mesh up to the last step") };
     let session = mesh.session().clone();
@@ -93,7 +94,7 @@ pub fn next_step(done: Done, mut start: Option<InitialGuess>, clock: &mut Clock)
                 solution.field = Field::default();
             }
         }
-        set_up(&session, built, Begin { start, steps }, clock)
+        set_up(&session, built, Begin { start, steps, largest }, clock)
     });
     let mut ready = ready.map_err(|error| error.because(format!("it is in load step {}", step + 1)))?;
     ready.earlier = earlier;
@@ -137,6 +138,7 @@ fn build_on(
     let MeshFacts { split, straightened, notes, .. } = mesh.facts();
     warnings.extend(warnings::in_parts(*split).into_iter().chain(warnings::made_straight(*straightened)));
     warnings.extend(notes.iter().cloned());
+    warnings.extend(warnings::without_history(&scene));
     warnings.extend(inner.applied_once().into_iter().chain(inner.idle_options()));
     let has_page = scene.output.report && session.rank() == 0;
     let marks = if has_page && marks.is_empty() { mesh.marks(&stepped.bodies, &discrete.model.pairs) } else { marks };
@@ -165,7 +167,8 @@ fn build_on(
 pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clock) -> Result<Prepared> {
     let _stage = session.stage("set-up");
     let scene = built.scene.clone();
-    let Begin { start, steps } = begin;
+    let Begin { start, steps, largest } = begin;
+    built.discrete.remember(&largest);
     for (i, pair) in steps.last().iter().flat_map(|step| step.pairs.iter().enumerate()) {
         if scene.method.steps.locks(steps.len(), &built.discrete.specs[i]) {
             built.discrete.lock(i, pair.offset.unwrap_or(0.0));
@@ -185,15 +188,14 @@ pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clo
         options::show_help(session)?;
     }
     clock.phase("set-up");
-    Ok(Prepared { built, method, start, steps, earlier: Vec::new(), warnings })
+    Ok(Prepared { built, method, start, steps, largest, earlier: Vec::new(), warnings })
 }
 
 /// Estimate the error of the solution, if the scene requests it.
 pub fn estimate(done: &mut Done, clock: &mut Clock) -> Result<Option<Estimate>> {
     let Outcome { status, iterate, layer, .. } = &done.outcome;
-    let good = status.is_solved() || *status == Status::IterationLimit;
     let discrete = &mut done.built.discrete;
-    let Some(meshes) = discrete.meshes.clone().filter(|_| good) else { return Ok(None) };
+    let Some(meshes) = discrete.meshes.clone().filter(|_| status.is_usable()) else { return Ok(None) };
     let model = &mut discrete.model;
     let estimate = estimate::estimate(&meshes, model, done.method.linear(), iterate, layer)?;
     if let Some((body, place)) = estimate::lost_at(&meshes, &discrete.model, &estimate) {

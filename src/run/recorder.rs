@@ -24,11 +24,11 @@ impl Recorder for Interrupt {}
 /// Solve until a rule or a signal ends the run. `full` is whether this is the full load. There the interval of gamma is
 /// computed if the scene requests it.
 pub fn solve(ready: Prepared, full: bool, keep: &mut dyn Recorder) -> Result<Done> {
-    let Prepared { mut built, mut method, start, steps, earlier, warnings } = ready;
+    let Prepared { mut built, mut method, start, steps, largest, earlier, warnings } = ready;
     let wants_interval = built.scene.method.interval && full;
     let stop = &built.scene.method.stop;
     let outcome = ddm::solve(&mut built.discrete.model, &mut method, stop, wants_interval, start, keep)?;
-    let mut done = Done { built, method, outcome, steps, earlier, warnings, recovered: None };
+    let mut done = Done { built, method, outcome, steps, largest, earlier, warnings, recovered: None };
     done.recovered = Some(results::recover(&done));
     Ok(done)
 }

@@ -281,6 +281,11 @@ pub fn contact_table(done: &Done, estimate: Option<&Estimate>, i: usize) -> Cont
         weight: pair.area.clone(),
         gap: pair.gap.clone(),
         compression: outcome.layer.compression[range.clone()].to_vec(),
+        compression_max: if pair.law.has_memory() && !done.largest.is_empty() {
+            done.largest[range.clone()].to_vec()
+        } else {
+            Vec::new()
+        },
         pressure: outcome.layer.pressure[range.clone()].to_vec(),
         displacement: sides.map(displacement),
         pressure_error: estimate.map_or(Vec::new(), |estimate| estimate.pressure_error[range].to_vec()),

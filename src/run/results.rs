@@ -318,7 +318,7 @@ pub fn pair(done: &Done, i: usize, approach: Option<f64>) -> StepPairReport {
         tension: tension(pair, c, p),
         peak_pressure: largest_pressure(p).1,
         peak_compression: peak(c),
-        closed: c.iter().filter(|c| **c > 0.0).count(),
+        closed: c.iter().enumerate().filter(|(point, c)| **c > pair.law.rest(*point)).count(),
         obstacle: obstacle(done, i),
         offset: offset(done, i),
     }

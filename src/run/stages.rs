@@ -77,6 +77,8 @@ pub struct Begin {
     pub start: Option<InitialGuess>,
     /// Earlier load steps.
     pub steps: Vec<StepReport>,
+    /// Largest compressions of the contact points in them, n; empty if no layer remembers.
+    pub largest: Vec<f64>,
 }
 
 /// A problem that is prepared for its first iteration, with the method set up and a start.
@@ -89,6 +91,8 @@ pub struct Prepared {
     pub start: InitialGuess,
     /// Earlier load steps.
     pub steps: Vec<StepReport>,
+    /// Largest compressions of the contact points in them, n; empty if no layer remembers.
+    pub largest: Vec<f64>,
     /// Iteration rows of the earlier load steps.
     pub earlier: Vec<Row>,
     /// Warnings on the set-up.
@@ -105,6 +109,8 @@ pub struct Done {
     pub outcome: Outcome,
     /// Load steps so far.
     pub steps: Vec<StepReport>,
+    /// Largest compressions of the contact points in them, n; empty if no layer remembers.
+    pub largest: Vec<f64>,
     /// Iteration rows of the load steps before.
     pub earlier: Vec<Row>,
     /// Warnings on the set-up.
@@ -118,6 +124,15 @@ impl Done {
     pub fn into_mesh(self) -> (Option<Box<dyn SceneMesh>>, Before) {
         let Built { discrete, solvers, marks, mesh, .. } = self.built;
         (mesh, Before { discrete, solvers, step: self.method.into_linear(), marks })
+    }
+
+    /// Note the largest compressions after a load step, if it has a solution and a layer remembers them.
+    pub fn remember(&mut self) {
+        let Outcome { status, layer, .. } = &self.outcome;
+        if status.is_usable() && self.model().pairs.iter().any(|pair| pair.law.has_memory()) {
+            let before = std::mem::take(&mut self.largest).into_iter().chain(std::iter::repeat(0.0));
+            self.largest = before.zip(&layer.compression).map(|(before, c)| c.max(before)).collect();
+        }
     }
 
     /// Return the model of the discrete problem.

@@ -57,6 +57,9 @@ fn steps(mut ready: Prepared, keep: &mut dyn Recorder, clock: &mut Clock) -> Res
                 "interrupted in load step {step} of {count}: pressures and displacements are those of this step"
             ));
         }
+        if !interrupted {
+            done.remember();
+        }
         let recovered = all.report(&mut done);
         warnings::note_ends(&mut done);
         all.keep.step(&done, &recovered);
@@ -146,9 +149,8 @@ impl<'a> Steps<'a> {
     /// Return the start of the step that follows this one, none if the scene has it.
     fn next_start(&self, done: &Done) -> Option<InitialGuess> {
         let Outcome { status, iterate, layer, .. } = &done.outcome;
-        let is_usable = status.is_solved() || *status == Status::IterationLimit;
         let known = || Solution { field: iterate.clone(), compression: layer.compression.clone() };
-        (is_usable && !self.history.is_at_rest(self.step)).then(|| InitialGuess::Known(Box::new(known())))
+        (status.is_usable() && !self.history.is_at_rest(self.step)).then(|| InitialGuess::Known(Box::new(known())))
     }
 }
 

@@ -15,6 +15,7 @@ use crate::output::closing::{DIGITS, place, readable};
 use crate::output::{BalanceReport, StepPairReport, sci};
 use crate::petsc::Session;
 use crate::problem::ContactSpec;
+use crate::scene::Scene;
 use std::f64::consts::PI;
 
 /// Return the warnings about a problem before it is solved.
@@ -37,6 +38,15 @@ pub fn of_problem(session: &Session, discrete: &Discrete) -> Vec<String> {
     warnings.extend(discrete.bodies.iter().filter_map(|body| body.warning.clone()));
     warnings.extend(of_surfaces(discrete));
     warnings
+}
+
+/// Return the warning of layers whose memory nothing uses, if any.
+pub fn without_history(scene: &Scene) -> Option<String> {
+    let remembers = scene.contacts.iter().any(|contact| contact.unload.is_some());
+    let is_single = scene.method.steps.is_empty();
+    (remembers && is_single).then(|| {
+        "`unload` without load steps: nothing takes load off a layer in one step; give method.steps".to_owned()
+    })
 }
 
 /// Return the warning of elements that were split, if any.

@@ -377,6 +377,7 @@ impl Scene {
             contact.refuse(geometry, &path, find, near)?;
             contact.layer.refuse(geometry, &format!("{path}.layer"), find, near)?;
             contact.tension.refuse(geometry, &format!("{path}.tension"), find, near)?;
+            contact.unload.refuse(geometry, &format!("{path}.unload"), find, near)?;
         }
         self.check_names()?;
         self.method.refuse(geometry, "method", find, place)?;

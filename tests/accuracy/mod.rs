@@ -6,6 +6,7 @@ mod cases;
 mod elasticity;
 mod layers;
 mod manufactured;
+mod memory;
 mod obstacles;
 mod preloads;
 mod space;

@@ -103,10 +103,9 @@ fn pair_on<const D: usize>(
     let (a, b) = (side(0), side(1));
     let shared = cut(&a, &b, &Reach::between(&a, &b, 60.0, None));
     let layer = load_scene(&case("patch"), &[]).expect("a scene").contacts.remove(0).layer;
-    let pair = assemble(&a, &b, [0, 1], &shared, &|_| 0.0, &|at| {
-        Ok(Law { compression: law::make(&layer, &OwnLaws::default(), at)?, tension: None })
-    })
-    .expect("a pair");
+    let pair =
+        assemble(&a, &b, [0, 1], &shared, &|_| 0.0, &|at| law::make(&layer, &OwnLaws::default(), at).map(Law::from))
+            .expect("a pair");
     (pair, spaces)
 }
 

@@ -2,11 +2,12 @@
 
 use super::expression::{Breach, ExpressionLaw, increases};
 use super::forms;
+use super::memory::Unloading;
 use super::table::Table;
 use super::{Law, LayerLaw, PerPoint};
 use crate::error::{Error, Kind, Result};
 use crate::linalg::diagonal;
-use crate::problem::layer::LayerSpec;
+use crate::problem::layer::{LayerSpec, UnloadSpec};
 use crate::problem::{ContactSpec, Own};
 use std::rc::Rc;
 
@@ -22,7 +23,28 @@ pub fn of_pair(spec: &ContactSpec, laws: &OwnLaws, position: &[[f64; 3]]) -> Res
         None => Some(compression.clone()),
         Some(tension) => Some(make(tension, laws, position)?),
     };
-    Ok(Law { compression, tension })
+    let unloading = spec.unload.as_ref().map(|unload| unloading(unload, &compression, laws, position)).transpose()?;
+    Ok(Law { compression, tension, unloading })
+}
+
+/// Return how a layer with the law `loading` is unloaded.
+///
+/// # Errors
+/// See [`make`]; and unloading that is softer than loading.
+fn unloading(
+    spec: &UnloadSpec,
+    loading: &Rc<dyn LayerLaw>,
+    laws: &OwnLaws,
+    position: &[[f64; 3]],
+) -> Result<Unloading> {
+    let unloading = match spec {
+        UnloadSpec::Law(law) => Unloading::Law(make(law, laws, position)?),
+        UnloadSpec::Slopes(rows) => {
+            Unloading::Slopes(rows.iter().map(|[_, pressure, slope]| [*pressure, *slope]).collect())
+        }
+    };
+    (0..position.len()).try_for_each(|point| unloading.check(&**loading, point, extent(position)))?;
+    Ok(unloading)
 }
 
 /// Make the law of a layer at the contact points `position`. `laws` are the laws that the program brings, by name.
@@ -66,7 +88,7 @@ pub type OwnLaws = Own<dyn Fn(&[[f64; 3]]) -> Box<dyn LayerLaw>>;
 /// # Errors
 /// An unknown name, and a function that is not the law of a layer.
 fn own(laws: &OwnLaws, name: &str, position: &[[f64; 3]], size: f64) -> Result<Rc<dyn LayerLaw>> {
-    let law = Law { compression: laws.get("law of a layer", name)?(position).into(), tension: None };
+    let law = Law::from(Rc::<dyn LayerLaw>::from(laws.get("law of a layer", name)?(position)));
     let refuse = |what: String| Error::new(Kind::Scene, format!("`{name}` is no law of a layer: {what}"));
     let last = match increases(0.0, size, |c| law.pressure_and_tangent(0, c)) {
         // a law may end at a rigid stop, beyond which its values are not finite

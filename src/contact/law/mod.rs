@@ -15,6 +15,7 @@
 mod expression;
 mod forms;
 mod make;
+mod memory;
 mod numeric;
 mod table;
 #[cfg(test)]
@@ -22,6 +23,7 @@ mod tests;
 
 pub use forms::Power;
 pub use make::{LawMaker, OwnLaws, make, of_pair};
+use memory::{Memory, Unloading};
 use std::rc::Rc;
 pub use table::Table;
 
@@ -38,6 +40,11 @@ pub trait LayerLaw: std::fmt::Debug {
     /// its tangent there, so that iterates may pass it.
     fn end(&self, _point: usize) -> f64 {
         f64::INFINITY
+    }
+
+    /// Return the compression up to which there is no pressure: 0, or more where a layer stays compressed.
+    fn rest(&self, _point: usize) -> f64 {
+        0.0
     }
 
     /// Return the law as a power of the compression if it is one, for which states have closed forms.
@@ -76,12 +83,21 @@ pub struct Law {
     pub compression: Rc<dyn LayerLaw>,
     /// The law of a bonded layer for c < 0, of the stretch -c and the tension -p.
     pub tension: Option<Rc<dyn LayerLaw>>,
+    /// How the layer is unloaded, if not along the law for c > 0.
+    unloading: Option<Unloading>,
+}
+
+impl From<Rc<dyn LayerLaw>> for Law {
+    /// Return the graph of a layer that lets go.
+    fn from(compression: Rc<dyn LayerLaw>) -> Self {
+        Self { compression, tension: None, unloading: None }
+    }
 }
 
 impl Law {
     /// Return the graph of a layer that lets go.
     pub fn new(law: impl LayerLaw + 'static) -> Self {
-        Self { compression: Rc::new(law), tension: None }
+        Self::from(Rc::new(law) as Rc<dyn LayerLaw>)
     }
 
     /// Return the law of the side on which `x`, a compression or a pressure, lies, and the sign of compressions and
@@ -92,6 +108,23 @@ impl Law {
             None if x <= 0.0 => None,
             _ => Some((&*self.compression, 1.0)),
         }
+    }
+
+    /// Return whether the layer is unloaded along another curve than it was loaded.
+    pub fn has_memory(&self) -> bool {
+        self.unloading.is_some()
+    }
+
+    /// Let the points of the law have had compressions up to `largest`, of which those up to 0 count as none.
+    pub fn remember(&mut self, largest: &[f64]) {
+        if let Some(unloading) = &self.unloading {
+            self.compression = Rc::new(Memory::new(self.compression.clone(), unloading, largest));
+        }
+    }
+
+    /// Return the compression up to which there is no pressure: 0, or more where a layer stays compressed.
+    pub fn rest(&self, point: usize) -> f64 {
+        self.compression.rest(point)
     }
 
     /// Return whether the layer pulls where it is stretched, at c < 0. Such a law has one state without pressure, at
@@ -139,9 +172,12 @@ impl Law {
     }
 
     /// Return g'(-c) of (38), the tangent of the paper's law g, which continues into tension as an odd function. Where
-    /// the layer is compressed, it is p'(c). The Robin terms of open points use it, the pressure never does.
+    /// the layer is compressed, it is p'(c), and where it stays compressed without pressure, p' at the end of that. The
+    /// Robin terms of open points use it, the pressure never does.
     pub fn robin_tangent(&self, point: usize, c: f64) -> f64 {
-        self.pressure_and_tangent(point, if self.is_bonded() { c } else { c.abs() }).1
+        let rest = self.rest(point);
+        let size = if rest > 0.0 && c.abs() <= rest { rest * (1.0 + f64::EPSILON) } else { c.abs() };
+        self.pressure_and_tangent(point, if self.is_bonded() && c < 0.0 { c } else { size }).1
     }
 
     /// Return the compression c of the only point (c, p) of the graph with c + p/rho = s, for a stiffness per area
@@ -180,7 +216,8 @@ impl Law {
         }
         let size = pressure.abs();
         // Without an end the unit of length is unknown, so no start is better than another.
-        let search = || numeric::root(size, [0.0, f64::MAX], law.end(point).min(1.0), |c| extended(law, point, c));
+        let (rest, start) = (law.rest(point), law.end(point).min(1.0));
+        let search = || numeric::root(size, [rest, f64::MAX], start.max(2.0 * rest), |c| extended(law, point, c));
         sign * match law.as_power(point) {
             Some(power) => power.compression(size),
             None => search().unwrap_or(f64::INFINITY),
@@ -211,7 +248,8 @@ impl Law {
             // An open layer without pressure is on the graph at any distance.
             return 0.0;
         }
-        let (at_c, on_graph) = (self.pressure(point, c), self.compression(point, pressure));
+        let on_graph = if pressure == 0.0 && c > 0.0 { self.rest(point) } else { self.compression(point, pressure) };
+        let at_c = self.pressure(point, c);
         let gap = (c - on_graph) * (at_c - pressure);
         // NaN comes from values that overflow or lie beyond the end of a law.
         if pressure < 0.0 && !self.is_bonded() || gap.is_nan() { f64::INFINITY } else { gap.max(0.0) }

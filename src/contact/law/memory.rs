@@ -1,0 +1,152 @@
+//! Layers that remember, such as gaskets and rough faces: what was compressed once is unloaded along another curve.
+//!
+//! Let m be the largest compression of a point so far and p_m the pressure of the law there. Up to m the pressure is
+//!
+//! ```text
+//! p(c) = max(0, p_m - q(m - c)),      q the law of unloading,
+//! ```
+//!
+//! and beyond m it is that of the law. It increases, so that each load step is a convex problem like any other. The
+//! pressure ends at c = m - x with q(x) = p_m, which is how far the layer stays compressed without pressure. That is
+//! 0 or more if q is nowhere softer than the law: q(m) >= p_m.
+
+use super::expression::samples;
+use super::forms::Power;
+use super::{Law, LayerLaw, PerPoint, extended};
+use crate::error::{Error, Kind, Result};
+use std::rc::Rc;
+
+/// How the pressure falls from the largest compression so far.
+#[derive(Debug, Clone)]
+pub enum Unloading {
+    /// Along this law, of the way back and of how far the pressure has fallen.
+    Law(Rc<dyn LayerLaw>),
+    /// Along straight lines. The slope depends on the largest pressure so far: points (pressure, slope), by increasing
+    /// pressures, between which it is linear.
+    Slopes(Vec<[f64; 2]>),
+}
+
+impl Unloading {
+    /// Return the slope at a largest pressure. It is constant before the first point and after the last one.
+    fn slope(points: &[[f64; 2]], pressure: f64) -> f64 {
+        match points.iter().position(|[p, _]| *p >= pressure) {
+            Some(0) => points[0][1],
+            Some(next) => {
+                let ([p0, k0], [p1, k1]) = (points[next - 1], points[next]);
+                k0 + (pressure - p0) / (p1 - p0) * (k1 - k0)
+            }
+            None => points.last().map_or(0.0, |last| last[1]),
+        }
+    }
+
+    /// Return the law of unloading of each point for its largest pressure so far.
+    fn at(&self, pressures: &[f64]) -> Law {
+        match self {
+            Self::Law(law) => law.clone().into(),
+            Self::Slopes(points) => {
+                let line = |&pressure: &f64| Power::linear(Self::slope(points, pressure));
+                Law::new(PerPoint(pressures.iter().map(line).collect()))
+            }
+        }
+    }
+
+    /// Check at a contact point that unloading is nowhere softer than `loading`, for compressions up to `size`.
+    ///
+    /// # Errors
+    /// It is softer at some compression.
+    pub fn check(&self, loading: &dyn LayerLaw, point: usize, size: f64) -> Result<()> {
+        for c in samples(size.min(loading.end(point))) {
+            let (pressure, _) = loading.pressure_and_tangent(point, c);
+            let fallen = match self {
+                Self::Law(law) => extended(&**law, point, c).0,
+                Self::Slopes(points) => Self::slope(points, pressure) * c,
+            };
+            if fallen < pressure * (1.0 - SAME) {
+                let [c, fallen, pressure] = [c, fallen, pressure].map(|value| format!("{value:.3e}"));
+                let message = format!(
+                    "`unload` is softer than the layer: on the way back from c = {c} the pressure falls by {fallen} of {pressure}"
+                );
+                return Err(Error::new(Kind::Scene, message)
+                    .because("a layer cannot press where it is open")
+                    .help("unload by a law that is at least as stiff as that of the layer, at every compression"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Share of a pressure by which rounding may make a law of unloading softer that is the law of the layer.
+const SAME: f64 = 1e-9;
+
+/// A law with the largest compressions that its points have seen.
+#[derive(Debug)]
+pub struct Memory {
+    loading: Rc<dyn LayerLaw>,
+    unloading: Law,
+    /// What each point remembers; `None` if it was never compressed.
+    points: Vec<Option<PointMemory>>,
+}
+
+/// What a point remembers.
+#[derive(Debug, Clone, Copy)]
+struct PointMemory {
+    /// m, the largest compression so far.
+    largest: f64,
+    /// p_m.
+    pressure: f64,
+    /// x with q(x) = p_m.
+    fall: f64,
+}
+
+impl Memory {
+    /// Return the law after its points have had compressions up to `largest`.
+    pub fn new(loading: Rc<dyn LayerLaw>, unloading: &Unloading, largest: &[f64]) -> Self {
+        let pressure = |(point, &m): (usize, &f64)| if m > 0.0 { extended(&*loading, point, m).0 } else { 0.0 };
+        let pressures: Vec<f64> = largest.iter().enumerate().map(pressure).collect();
+        let unloading = unloading.at(&pressures);
+        let memory = |(point, (&largest, &pressure)): (usize, (&f64, &f64))| {
+            let fall = || unloading.compression(point, pressure).min(largest);
+            (largest > 0.0).then(|| PointMemory { largest, pressure, fall: fall() })
+        };
+        let points = largest.iter().zip(&pressures).enumerate().map(memory).collect();
+        Self { loading, unloading, points }
+    }
+
+    /// Return the energy of a layer that was unloaded by `back` from its largest compression.
+    fn unloaded_energy(&self, point: usize, memory: PointMemory, back: f64) -> f64 {
+        let PointMemory { pressure, fall, .. } = memory;
+        let fallen = |x: f64| self.unloading.energy(point, x);
+        if back < fall { pressure * (fall - back) - (fallen(fall) - fallen(back)) } else { 0.0 }
+    }
+}
+
+impl LayerLaw for Memory {
+    fn pressure_and_tangent(&self, point: usize, c: f64) -> (f64, f64) {
+        let Some(PointMemory { largest, pressure, fall }) = self.points[point].filter(|memory| c < memory.largest)
+        else {
+            return self.loading.pressure_and_tangent(point, c);
+        };
+        if largest - c >= fall {
+            return (0.0, 0.0);
+        }
+        let (fallen, tangent) = self.unloading.pressure_and_tangent(point, largest - c);
+        (pressure - fallen, tangent)
+    }
+
+    fn energy(&self, point: usize, c: f64) -> f64 {
+        let Some(memory) = self.points[point] else { return self.loading.energy(point, c) };
+        let largest = memory.largest;
+        let unloaded = self.unloaded_energy(point, memory, (largest - c).max(0.0));
+        let beyond =
+            if c > largest { self.loading.energy(point, c) - self.loading.energy(point, largest) } else { 0.0 };
+        unloaded + beyond
+    }
+
+    fn end(&self, point: usize) -> f64 {
+        self.loading.end(point).max(self.points[point].map_or(0.0, |memory| memory.largest))
+    }
+
+    fn rest(&self, point: usize) -> f64 {
+        self.points[point].map_or(0.0, |memory| memory.largest - memory.fall)
+    }
+}

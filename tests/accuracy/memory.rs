@@ -1,0 +1,111 @@
+//! Layers that are unloaded along another curve.
+
+use crate::common::here::{solve_here, try_here};
+use crate::common::{Run, Scene, case, distance, solve_on};
+
+/// A patch under the pressures 10, 4, 15 and 2, whose layer has the stiffness 1e5.
+const LOADS: [&str; 2] = ["body.upper.load.0.pressure=2", "contact.0.layer={linear={stiffness=1e5}}"];
+const PRESSURES: [f64; 4] = [10.0, 4.0, 15.0, 2.0];
+
+fn with_method(method: &str) -> String {
+    format!("method={{{method},steps=[5,2,7.5,1]}}")
+}
+
+fn close(what: &str, ours: f64, exact: f64, tolerance: f64) {
+    assert!((ours / exact - 1.0).abs() < tolerance, "{what}: {ours}, by hand {exact}");
+}
+
+/// Compressions by hand: loaded, unloaded, loaded beyond the largest pressure, unloaded.
+#[test]
+fn loading_and_unloading_by_hand() {
+    let straight = [1e-4, 1e-4 - 6.0 / 1e6, 1.5e-4, 1.5e-4 - 13.0 / 1e6];
+    // the slope at 15 is half way from that at 10 to that at 20
+    let sloped = [1e-4, 1e-4 - 6.0 / 1e6, 1.5e-4, 1.5e-4 - 13.0 / 2e6];
+    // 1e6 x + 1e10 x^2 = fall
+    let way = |fall: f64| ((1e12 + 4e10 * fall).sqrt() - 1e6) / 2e10;
+    let curved = [1e-4, 1e-4 - way(6.0), 1.5e-4, 1.5e-4 - way(13.0)];
+    for (unload, exact) in [
+        ("{linear={stiffness=1e6}}", straight),
+        ("{table=[[1e-4,10,1e6],[2e-4,20,3e6]]}", sloped),
+        ("{pressure='1e6*c+1e10*c^2'}", curved),
+    ] {
+        let unload = format!("contact.0.unload={unload}");
+        for (method, tolerance) in [
+            ("name='newton'", 1e-10),
+            ("linear='direct'", 1e-10),
+            ("linear='multigrid'", 1e-7),
+            ("name='newton-robin'", 1e-7),
+            ("name='robin',gamma=0.4,robin='auto'", 1e-6),
+        ] {
+            let method = with_method(method);
+            let run = solve_here(case("patch"), &[LOADS[0], LOADS[1], &unload, &method]).converged();
+            for step in 0..4 {
+                let number = |what: &str| run.number(&format!("steps/{step}/pairs/0/peak_{what}"));
+                let what = format!("{unload} {method} step {step}");
+                close(&what, number("pressure"), PRESSURES[step], tolerance);
+                close(&what, number("compression"), exact[step], tolerance);
+            }
+        }
+        let method = with_method("name='newton'");
+        let sets = [LOADS[0], LOADS[1], &unload, &method].map(|set| ["--set", set]).concat();
+        let table = solve_on(3, case("patch"), &sets).converged().table("contact.csv");
+        assert!(table["compression_max"].iter().all(|c| (c / 1.5e-4 - 1.0).abs() < 1e-10), "{unload}");
+    }
+}
+
+/// A wave is crushed by a pressure of 80, so that its points have compressions of their own.
+fn wave(steps: &str) -> Vec<String> {
+    let unload = "contact.0.unload={linear={stiffness=1e6}}".to_owned();
+    vec![unload, format!("method={{steps={steps},stop={{residual=1e-12}}}}")]
+}
+
+/// The second loading of a crushed wave goes along the first unloading, up to the largest load, and from there along the law.
+#[test]
+fn a_crushed_wave() {
+    let solve = |steps: &str| {
+        let sets = wave(steps);
+        let words: Vec<&str> = sets.iter().flat_map(|set| ["--set", set.as_str()]).collect();
+        solve_on(1, case("wavy"), &words).converged().table("contact.csv")
+    };
+    let [unloaded, loaded_again] = ["[2,1]", "[2,0.5,1]"].map(solve);
+    assert!(distance(&loaded_again["pressure"], &unloaded["pressure"]) < 1e-9);
+    assert!(distance(&loaded_again["compression"], &unloaded["compression"]) < 1e-9);
+    let [fresh, crushed] = ["[0.5,1]", "[0.6,0.2,1]"].map(solve);
+    assert!(distance(&crushed["pressure"], &fresh["pressure"]) < 1e-9);
+    // the crushed layer is stiffer, and the pressure of the wave grows
+    let peak = |pressure: &[f64]| pressure.iter().copied().fold(0.0, f64::max);
+    assert!(peak(&unloaded["pressure"]) > 1.001 * peak(&fresh["pressure"]));
+}
+
+/// A run that ended in the middle of its steps goes on with the compressions of the steps before, on any ranks.
+#[test]
+fn memory_is_kept_over_a_restart() {
+    let sets = wave("[2,0.5,1]");
+    for (ranks, then) in [(1, 3), (3, 1)] {
+        let words: Vec<&str> = sets.iter().flat_map(|set| ["--set", set.as_str()]).collect();
+        let whole = solve_on(ranks, case("wavy"), &words).converged();
+        let short = [&words[..], &["--set", "method.stop.iterations=1"]].concat();
+        let ended = solve_on(ranks, case("wavy"), &short);
+        assert_eq!(ended["status"], "iteration-limit", "{}", ended.said());
+        let folder = ended.folder.display().to_string();
+        let rest = solve_on(then, case("wavy"), &[&words[..], &["--restart", &folder]].concat()).converged();
+        let last = |run: &Run| run.table("contact.csv")["pressure"].to_vec();
+        assert!(distance(&last(&rest), &last(&whole)) < 1e-9);
+    }
+}
+
+/// Unloading that is softer than loading, and memory that nothing uses.
+#[test]
+fn what_cannot_be_unloaded() {
+    let refused = |unload: &str, words: &str| {
+        let sets = [LOADS[0], LOADS[1], &format!("contact.0.unload={unload}"), &with_method("name='newton'")];
+        let error = try_here(case("patch"), &sets).err().map(|error| error.render(false)).unwrap_or_default();
+        assert!(error.contains(words), "{unload}: {error}");
+    };
+    refused("{linear={stiffness=5e4}}", "softer than the layer");
+    refused("{table=[[1e-4,10,5e4]]}", "softer than the layer");
+    refused("{table=[[1e-4,10,-1]]}", "slope");
+    refused("{linear={stiffness=-1}}", "stiffness is -1");
+    let scene = Scene::edited("patch", "[method]", "unload = { linear = { stiffness = 1e9 } }\n[method]");
+    assert!(solve_here(&scene.path, &[]).warnings().contains("`unload` without load steps"));
+}
