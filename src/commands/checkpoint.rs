@@ -27,7 +27,7 @@ pub const FILE: &str = "checkpoint";
 pub const ASIDE: &str = "checkpoint.old";
 
 /// The first line.
-const FORMAT: &str = "winkler checkpoint 8";
+const FORMAT: &str = "winkler checkpoint 9";
 
 /// The beginning of the first line in all versions.
 const ANY_FORMAT: &[u8] = b"winkler checkpoint ";

@@ -84,8 +84,7 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &SweepArgs) -> R
         let mut done = run::iterate(ready, interrupt, &mut requests, &mut clock)?;
         let estimate = run::estimate(&mut done, &mut clock)?;
         clock.total();
-        let mut report = report::report(session, &done, &results::recover(&done), &clock);
-        report.discretization_error = estimate.as_ref().map(report::discretization_error);
+        let report = report::report(session, &done, &results::recover(&done), estimate.as_ref(), &clock);
         exit = exit.max(verdict::exit_code(&done));
         if session.rank() == 0 {
             sweep.add(case, &done, report)?;
@@ -174,7 +173,7 @@ impl Sweep<'_> {
 
     /// Write the row of a run to the table, print it, and keep its report and its curves.
     fn add(&mut self, case: &Case, done: &Done, report: Report) -> Result<()> {
-        let row = Row::of_report(&serde_json::json!(report));
+        let row = Row::from(&report);
         let scene = &done.built.scene;
         if let (Some(table), Some(names)) = (&mut self.table, &self.names) {
             let fields = self.plan.fields(case).chain(row.fields()).chain(result_fields(&report, names));
@@ -214,18 +213,11 @@ impl Sweep<'_> {
 
 /// Return the fields of all pairs and reactions.
 fn result_fields(report: &Report, names: &ResultNames) -> Vec<Cell> {
-    let mut fields = Vec::new();
-    let estimates = report.discretization_error.iter().flat_map(|error| error.pressure.iter().zip(&names.pairs));
-    fields.extend(estimates.map(|(error, name)| tables::number(format!("pressure_estimate {name}"), *error)));
-    for (pair, name) in report.pairs.iter().zip(&names.pairs) {
-        fields.push(tables::number(format!("normal_force {name}"), pair.normal_force));
-        fields.push(tables::number(format!("mean_pressure {name}"), pair.mean_pressure));
-        fields.extend(tables::peaks(name, pair.peak_pressure, pair.tension));
-        fields.push(names.contact(name, &pair.extent));
-        fields.push(tables::number(format!("layer_energy {name}"), pair.layer_energy));
-        fields.extend(tables::vector("force", name, &pair.force[0], names.dimension));
-        fields.push(tables::number(format!("approach {name}"), pair.approach));
-    }
+    let pairs = || report.pairs.iter().zip(&names.pairs);
+    let estimates = pairs().filter_map(|(pair, name)| Some((pair.estimate?.pressure_estimate, name)));
+    let mut fields: Vec<Cell> =
+        estimates.map(|(error, name)| tables::number(format!("pressure_estimate {name}"), error)).collect();
+    fields.extend(pairs().flat_map(|(pair, name)| names.of_run(&pair.result, name)));
     fields.extend(names.reactions(&results::reported(&report.bodies)));
     fields
 }

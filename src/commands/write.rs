@@ -4,7 +4,6 @@
 use super::adapt::AdaptiveRun;
 use super::checkpoint;
 use super::plots::{self, Plots};
-use crate::contact::ContactPair;
 use crate::discretize::{BodyInfo, corners};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::Estimate;
@@ -12,9 +11,9 @@ use crate::exchange::{all_gather, gather};
 use crate::output::folder::{MARK_OF_MESH, REPORT, STEPS};
 use crate::output::views::Tags;
 use crate::output::vtu::{self, CollectionEntry, write_pvd};
-use crate::output::{Folder, LISTED, PairReport, PairRow, Report, busiest, safe_name, tables};
+use crate::output::{Folder, LISTED, PairReport, Report, busiest, safe_name, tables};
+use crate::page::{self, Page, Surface};
 use crate::petsc::Session;
-use crate::report::{self as page, Page, Surface};
 use crate::run::results::{self, pair_names};
 use crate::run::{All, Built, Clock, Done, Recovered, report};
 use crate::scene::{Precision, Scene};
@@ -47,14 +46,14 @@ impl ResultFiles<'_> {
         let output = &done.built.scene.output;
         let is_first = session.rank() == 0;
         let recovered = results::recover(done);
-        let mut report = report::report(session, done, &recovered, clock);
-        report.discretization_error = self.estimate.map(report::discretization_error);
+        let mut report = report::report(session, done, &recovered, self.estimate, clock);
         report.rounds.clone_from(&self.plan.rounds);
         change(&mut report);
         let shown = busiest(&report.pairs, output.pairs.unwrap_or(LISTED));
         report.left_out = left_out(&report.pairs, &shown);
         let mut plots = Plots::default();
         plots.add("pressure", done, &shown);
+        self.name_files(&mut report, &shown, &plots);
         let mut written = if is_first { self.tables_and_plots(&report, &shown, &plots) } else { Ok(()) };
         if let Some(mesh) = done.built.file.as_ref().filter(|_| self.fields && self.plan.adapts()) {
             written = written.and(copy_mesh(folder, &mesh.path));
@@ -81,23 +80,24 @@ impl ResultFiles<'_> {
         (report, failed.map_or(written, Err))
     }
 
+    /// Name the table and the plot of each pair that is shown.
+    fn name_files(&self, report: &mut Report, shown: &[usize], plots: &Plots) {
+        let stems = stems(&self.done.built);
+        shown.iter().for_each(|&i| report.pairs[i].table = Some(format!("{}.csv", stems[i])));
+        let drawn = plots.files().filter(|_| self.done.built.scene.output.plots);
+        drawn.for_each(|(i, file)| report.pairs[i].plot = Some(file));
+    }
+
     /// Write the table of all pairs, a table for each of the pairs that are shown, and the plots if the scene wants
     /// them.
     fn tables_and_plots(&self, report: &Report, shown: &[usize], plots: &Plots) -> Result<()> {
         let (folder, done) = (self.folder, self.done);
-        let has_plots = done.built.scene.output.plots;
-        let (model, layer) = (done.model(), &done.outcome.layer);
-        let compression = |i: usize| &layer.compression[model.range(i)];
-        let row = |(i, pair): (usize, &ContactPair)| PairRow::new(&pair.area, &pair.gap, compression(i));
-        let mut rows: Vec<PairRow> = model.pairs.iter().enumerate().map(row).collect();
-        let stems = stems(&done.built);
-        shown.iter().for_each(|&i| rows[i].table = format!("{}.csv", stems[i]));
-        plots.files().filter(|_| has_plots).for_each(|(i, file)| rows[i].plot = file);
-        tables::save(folder, &report.pairs, &rows)?;
-        for &i in shown {
+        tables::save(folder, &report.pairs)?;
+        for (i, file) in report.pairs.iter().enumerate().filter_map(|(i, pair)| Some((i, pair.table.as_ref()?))) {
             let table = report::contact_table(done, self.estimate, i);
-            folder.write(&rows[i].table, |out| table.write(out))?;
+            folder.write(file, |out| table.write(out))?;
         }
+        let has_plots = done.built.scene.output.plots;
         if !has_plots {
             return Ok(());
         }
@@ -132,7 +132,10 @@ impl ResultFiles<'_> {
             bodies,
             marks: &done.built.marks,
             contacts: in_space
-                .map(|&i| Surface::of_contact(report::contact_surface(&names[i], done, i, &displacement[i])))
+                .map(|&i| {
+                    let surface = report::contact_surface(&names[i], done, i, &displacement[i]);
+                    Surface::of_contact(surface, done.model().pairs[i].bodies[0])
+                })
                 .collect(),
             pressures: plots.pressures().collect(),
             approach: plots::approaches(done, shown),
@@ -176,6 +179,7 @@ fn mark(bodies: &mut [Surface], done: &Done) {
         points.get(&corners(facet.iter().copied())).is_some_and(|[all, closed]| *closed > 0 && 2 * closed >= *all)
     };
     for (index, body) in bodies.iter_mut().enumerate() {
+        body.body = index;
         body.mark(done.built.marks.iter().filter(|mark| mark.body == index), &is_closed);
     }
 }

@@ -12,7 +12,7 @@ use crate::fem::{length, minus};
 use crate::linalg;
 use crate::model::Mechanism;
 use crate::output::closing::{DIGITS, place, readable};
-use crate::output::{BalanceReport, StepPairReport, sci};
+use crate::output::{BalanceReport, PairResult, sci};
 use crate::petsc::Session;
 use crate::problem::ContactSpec;
 use std::f64::consts::PI;
@@ -356,8 +356,8 @@ fn most_stretched(done: &Done, i: usize) -> Option<Largest> {
 
 /// Return the largest of what `of` takes from the reports of a pair over all solutions of a run: a compression and a
 /// pressure.
-fn largest(done: &Done, i: usize, of: fn(&StepPairReport) -> Option<[f64; 2]>) -> Option<Largest> {
-    let found = |pair: &StepPairReport, step| of(pair).map(|[most, pressure]| Largest { most, pressure, step });
+fn largest(done: &Done, i: usize, of: fn(&PairResult) -> Option<[f64; 2]>) -> Option<Largest> {
+    let found = |pair: &PairResult, step| of(pair).map(|[most, pressure]| Largest { most, pressure, step });
     if done.steps.is_empty() {
         let is_solved = done.outcome.status.is_solved();
         return is_solved.then(|| results::pair(done, i, None)).and_then(|pair| found(&pair, None));

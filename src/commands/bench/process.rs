@@ -8,11 +8,10 @@ use crate::file::digest;
 use crate::interrupt::{self, Interrupt};
 use crate::linalg::range;
 use crate::output::folder::{MARK, REPORT, is_made, refuse_link};
-use crate::output::{Folder, refuse_foreign, safe_name, write_whole};
+use crate::output::{Folder, Report, refuse_foreign, safe_name, write_whole};
 use crate::parallel::launcher;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
-use serde_json::Value;
 use std::fs::{self, File};
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
@@ -151,11 +150,12 @@ impl Runner {
         Folder::create(&folder)?.clear()?;
         let ended = self.finish(command, &folder)?;
         let report = fs::read(folder.join(REPORT)).ok().filter(|_| is_made(&folder.join(REPORT)));
-        let report = report.and_then(|bytes| serde_json::from_slice::<Value>(&bytes).ok());
+        let report = report.map(|bytes| serde_json::from_slice::<Report>(&bytes));
         let row = match (ended.used.as_ref(), report) {
             (None, _) => Row::unsolved("failed", &ended.output),
             _ if ended.is_late => Row::unsolved("timeout", &format!("not ended after {:?}", self.timeout)),
-            (_, Some(report)) => Row::of_report(&report),
+            (_, Some(Ok(report))) => Row::from(&report),
+            (_, Some(Err(cause))) => Row::unsolved("failed", &format!("its report cannot be read: {cause}")),
             (Some(used), None) => Row::unsolved(status_of(used.status), &message(&ended.output, used.status)),
         };
         let cpu = |used: &ResUse| (used.rusage.utime + used.rusage.stime).as_secs_f64();
