@@ -67,7 +67,7 @@ impl From<&Report> for Row {
             residual: report.residual,
             increment: report.increment,
             f1: report.f1,
-            peak_pressure: report.pairs.iter().map(|pair| pair.result.peak_pressure).reduce(f64::max),
+            peak_pressure: report.results().map(|pair| pair.peak_pressure).reduce(f64::max),
             seconds: time("total"),
             mesh_seconds: time("mesh"),
             discretize_seconds: time("discretize"),

@@ -189,7 +189,7 @@ impl Sweep<'_> {
             self.bar.suspend(|| say(row.line(&case.label)))?;
         }
         let most = scene.output.pairs.unwrap_or(LISTED);
-        let shown = self.shown.get_or_insert_with(|| busiest(&report.pairs, most));
+        let shown = self.shown.get_or_insert_with(|| busiest(report.results(), most));
         self.plots.add(&case.label, done, shown);
         self.reports.push(report);
         Ok(())

@@ -49,7 +49,7 @@ impl ResultFiles<'_> {
         let mut report = report::report(session, done, &recovered, self.estimate, clock);
         report.rounds.clone_from(&self.plan.rounds);
         change(&mut report);
-        let shown = busiest(&report.pairs, output.pairs.unwrap_or(LISTED));
+        let shown = busiest(report.results(), output.pairs.unwrap_or(LISTED));
         report.left_out = left_out(&report.pairs, &shown);
         let mut plots = Plots::default();
         plots.add("pressure", done, &shown);
@@ -151,6 +151,7 @@ impl ResultFiles<'_> {
         let mut of_ranks = field_files(&done.built, &|name| safe_name(name));
         for step in 1..=done.steps.len() {
             of_ranks.extend(field_files(&done.built, &|name| stem_of(name, step, steps)));
+            of_ranks.extend(stems(&done.built).iter().map(|stem| format!("{}.csv", stem_of(stem, step, steps))));
         }
         of_ranks.retain(|name| self.folder.path().join(name).is_file());
         let mut names = [self.folder.files(), of_ranks, vec![REPORT.to_owned()]].concat();
@@ -228,8 +229,9 @@ pub fn planned_on_mesh(built: &Built) -> Vec<String> {
     let mut fields = field_files(built, &|name| safe_name(name));
     fields.extend(stems.iter().flat_map(|stem| ["vtu", "msh"].map(|ending| format!("{stem}.{ending}"))));
     fields.retain(|file| if file.ends_with("msh") { output.msh } else { output.vtu });
-    for step in (1..steps).filter(|_| output.vtu) {
-        fields.extend(field_files(built, &|name| stem_of(name, step, steps)));
+    for step in 1..steps {
+        fields.extend(stems.iter().map(|stem| format!("{}.csv", stem_of(stem, step, steps))));
+        fields.extend(field_files(built, &|name| stem_of(name, step, steps)).into_iter().filter(|_| output.vtu));
     }
     [planned(scene), stems.iter().map(|stem| format!("{stem}.csv")).collect(), fields].concat()
 }
@@ -320,6 +322,19 @@ pub fn write_fields(done: &Done, recovered: &All, folder: &Folder, ended: bool) 
     let stem = |name: &str| if ended { safe_name(name) } else { stem_of(name, step, steps) };
     fields(done, recovered, folder, &stem, &displacement)?;
     collection(done, folder, ended)
+}
+
+/// Write the tables of contact points at the end of a load step before the last, on the first rank: those of the pairs
+/// with the largest forces of the step.
+pub fn write_step_tables(done: &Done, folder: &Folder) -> Result<()> {
+    let (scene, step) = (&done.built.scene, done.steps.len());
+    let Some(last) = done.steps.last().filter(|_| done.model().exchange.rank() == 0) else { return Ok(()) };
+    folder.make_steps()?;
+    let (stems, steps) = (stems(&done.built), scene.method.steps.steps.len());
+    busiest(last.pairs.iter(), scene.output.pairs.unwrap_or(LISTED)).into_iter().try_for_each(|i| {
+        let file = format!("{}.csv", stem_of(&stems[i], step, steps));
+        folder.write(&file, |out| report::contact_table(done, None, i).write(out))
+    })
 }
 
 /// Write bodies and contact surfaces for Gmsh, each file with tags of its own.

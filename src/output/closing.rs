@@ -95,7 +95,7 @@ impl Report {
             lines.extend(self.steps.iter().enumerate().map(|(index, step)| self.step_line(index + 1, step, units)));
         }
         lines.extend(self.left_out.iter().map(|left_out| format!("  {left_out}")));
-        let listed = busiest(&self.pairs, LISTED).into_iter().map(|i| &self.pairs[i]);
+        let listed = busiest(self.results(), LISTED).into_iter().map(|i| &self.pairs[i]);
         // where loads push bodies without end, or against nothing, there is no state of them to tell
         if !self.has_no_state() {
             lines.extend(listed.map(|pair| pair_line(pair, self.is_bonded(pair), units)));

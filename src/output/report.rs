@@ -486,6 +486,13 @@ pub struct ReactionReport {
     pub force: [f64; 3],
 }
 
+impl Report {
+    /// Return the results of all pairs.
+    pub fn results(&self) -> impl Iterator<Item = &PairResult> {
+        self.pairs.iter().map(|pair| &pair.result)
+    }
+}
+
 /// Numbers of a report. JSON has null for those that are not finite.
 trait Numbers {
     /// What JSON has.
@@ -533,10 +540,9 @@ pub const LISTED: usize = 24;
 
 /// Return the indices of the `most` pairs with the largest forces, in the order of the scene. Among equal forces the
 /// first is preferred; a force that is not finite counts as zero.
-pub fn busiest(pairs: &[PairReport], most: usize) -> Vec<usize> {
-    let squared = |pair: &PairReport| pair.result.force[0].iter().map(|f| f * f).sum();
-    let sizes: Vec<f64> =
-        pairs.iter().map(squared).map(|size: f64| if size.is_finite() { size } else { 0.0 }).collect();
+pub fn busiest<'p>(pairs: impl Iterator<Item = &'p PairResult>, most: usize) -> Vec<usize> {
+    let squared = |pair: &PairResult| pair.force[0].iter().map(|f| f * f).sum();
+    let sizes: Vec<f64> = pairs.map(squared).map(|size: f64| if size.is_finite() { size } else { 0.0 }).collect();
     let mut order: Vec<usize> = (0..sizes.len()).collect();
     order.sort_by(|&i, &j| sizes[j].total_cmp(&sizes[i]));
     order.truncate(most);
@@ -550,12 +556,9 @@ mod tests {
 
     #[test]
     fn the_largest_keep_their_order() {
-        let pair = |force: f64| PairReport {
-            result: PairResult { force: [[0.0, force, 0.0], [0.0; 3]], ..PairResult::default() },
-            ..PairReport::default()
-        };
+        let pair = |force: f64| PairResult { force: [[0.0, force, 0.0], [0.0; 3]], ..PairResult::default() };
         let pairs = [5.0, f64::NAN, -9.0, 5.0].map(pair);
-        let busiest = |most| busiest(&pairs, most);
+        let busiest = |most| busiest(pairs.iter(), most);
         assert_eq!([busiest(1), busiest(2), busiest(9)], [vec![2], vec![0, 2], vec![0, 1, 2, 3]]);
     }
 }

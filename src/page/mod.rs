@@ -232,7 +232,7 @@ impl Page<'_> {
         if pairs.is_empty() || self.report.has_no_state() {
             return String::new();
         }
-        let shown: Vec<&PairReport> = busiest(pairs, FIRST).into_iter().map(|i| &pairs[i]).collect();
+        let shown: Vec<&PairReport> = busiest(self.report.results(), FIRST).into_iter().map(|i| &pairs[i]).collect();
         let table = Table::of(&shown)
             .column("contact", |pair| escape(&pair.surfaces.join(" – ")))
             .column(self.force("#normal force"), |pair| digits(pair.result.normal_force))

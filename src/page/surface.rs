@@ -281,7 +281,7 @@ fn roles(marks: &[Mark]) -> Vec<[String; 3]> {
         (Role::Load, "load", "loads", "#d55e00"),
         (Role::Spring, "spring", "springs", "#e69f00"),
         (Role::Contact, "closed", "closed contact", "#cc3fa0"),
-        (Role::Contact, "open", "open contact", "#4d4d4d"),
+        (Role::Contact, "open", "open contact", "#5c6670"),
     ];
     let legend = |(role, name, words, color): (Role, &str, &str, &str)| {
         let on: BTreeSet<&str> = marks.iter().filter(|mark| mark.role == role).map(|mark| mark.on.as_str()).collect();

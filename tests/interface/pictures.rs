@@ -1,6 +1,6 @@
 //! The page of a run.
 
-use crate::common::{Scene, case, output, solve};
+use crate::common::{Scene, Table, case, output, solve};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
@@ -76,7 +76,7 @@ fn a_plane_run_has_a_page_of_its_own() {
     for foreign in ["<img", "<link rel=\"style", "<script src", "@import", "url(", "<b>A</b>", "<script>boom"] {
         assert!(!page.contains(foreign), "{foreign}");
     }
-    let error = if run.report["error_bound"].is_null() { "is estimated as" } else { "is at most" };
+    let error = if run.report["error_bound"].is_null() { "estimated error" } else { "error at most" };
     for words in [
         "&lt;b&gt;A&lt;/b&gt; &amp;",
         "von Mises stress, MPa",
@@ -104,7 +104,15 @@ fn a_plane_run_has_a_page_of_its_own() {
     };
     assert_eq!(kinds(&view["bodies"][0]), ["closed", "open", "support"]);
     assert_eq!(kinds(&view["bodies"][1]), ["closed", "load", "open", "support"]);
-    assert!(page.contains("supports: lower_axis, lower_face, upper_axis<") && page.contains("loads: upper_face<"));
+    let legend: Vec<&str> =
+        view["roles"].as_array().expect("roles").iter().filter_map(|role| role[1].as_str()).collect();
+    let surfaces = "lower_top, upper_bottom";
+    assert_eq!(legend[..2], ["supports: lower_axis, lower_face, upper_axis", "loads: upper_face"]);
+    assert_eq!(legend[2..], [format!("closed contact: {surfaces}"), format!("open contact: {surfaces}")]);
+    // the numbers of the contact come first, then the picture, which has no warnings before it
+    let [numbers, picture, more] =
+        ["<td data-of=\"contact\">", "<canvas>", "<h2>Contact</h2>"].map(|words| page.find(words).expect(words));
+    assert!(numbers < picture && picture < more && !page[..picture].contains("class=\"warning\""));
     let lines = |body: usize, kind: usize| {
         let text = view["bodies"][body]["marks"][kind][1][1].as_str().expect("base64");
         STANDARD.decode(text).expect("base64").len() / 8
@@ -146,11 +154,53 @@ fn the_mouse_reads_values() {
         assert!(under.starts_with("upper at (2") && under.ends_with(" (von Mises stress)"), "{under}");
         let bar = dom.split("class=\"bar\">").nth(1).and_then(|rest| rest.split("</div>").next()).expect("a bar");
         assert!(
-            bar.contains(">5</span>") && bar.ends_with("to 11"),
+            bar.contains(">5</span>") && bar.contains(">to 11</span>"),
             "colours begin and end with what was typed: {bar}"
         );
         let axes = dom.split("class=\"axes\"").nth(1).and_then(|rest| rest.split("</svg>").next()).expect("axes");
         assert!(axes.contains(">x</text>") && axes.contains(">y</text>") && !axes.contains(">z</text>"), "{axes}");
+    }
+}
+
+/// Places where something acts are drawn if they are chosen, with their own legend, and the picture can be saved. Warnings are folded. Load steps have their
+/// forces in a table, and their contact points in files.
+#[test]
+fn a_page_of_load_steps() {
+    let run = solve(case("bolt"), &["--report", "--estimate"]).converged();
+    let html = page(&run.folder);
+    let warnings = html.find("<details><summary>3 warnings</summary>").expect("folded warnings");
+    assert!(html.find("<canvas>").is_some_and(|picture| picture < warnings) && html.contains("<h2>Load steps</h2>"));
+    let count = run.report["steps"].as_array().expect("steps").len();
+    for step in 0..count {
+        let force = run.number(&format!("steps/{step}/pairs/0/normal_force"));
+        let cell = format!("{force:.2}").trim_end_matches('0').trim_end_matches('.').replace('-', "−");
+        let row = format!("<td data-of=\"of\">top1 – cut</td><td class=\"n\" data-of=\"step\">{}</td>", step + 1);
+        let line = html.lines().find(|line| line.contains(&row)).expect("a row of the step");
+        assert!(line.contains(&format!("<td class=\"n\" data-of=\"normal force\">{cell}</td>")), "{cell}: {line}");
+        let pair = |key: &str| run.number(&format!("pairs/{step}/{key}"));
+        if step < run.report["pairs"].as_array().map_or(0, Vec::len) {
+            assert_eq!(pair("pressure_estimate"), run.number(&format!("discretization_error/pressure/{step}")));
+        }
+        if step + 1 < count {
+            let points = Table::read(&run.folder.join(format!("steps/contact-column1-head-{}.csv", step + 1)));
+            let sum: f64 = (0..points.rows()).map(|q| points["weight"][q] * points["pressure"][q]).sum();
+            assert!((sum - force).abs() < 1e-9 * force.abs(), "step {step}: {sum} {force}");
+        }
+    }
+    let choosing = "<script>setTimeout(() => {
+        const what = document.querySelector('select');
+        what.value = 'places';
+        what.dispatchEvent(new Event('change'));
+        HTMLAnchorElement.prototype.click = function() { document.title = this.download + ' ' + this.href.slice(0, 22); };
+        [...document.querySelectorAll('#bodies button')].find(button => button.textContent.startsWith('Save')).click();
+    }, 100)</script></body>";
+    let path = run.folder.join("chosen.html");
+    fs::write(&path, html.replacen("</body>", choosing, 1)).expect("a page");
+    if let Some(dom) = opened(&path) {
+        let bar =
+            dom.split("class=\"bar roles\">").nth(1).and_then(|rest| rest.split("</div>").next()).expect("a legend");
+        assert!(bar.contains(">supports: base0, base1, base2, pin, ") && bar.contains(">loads: crown<"), "{bar}");
+        assert!(dom.contains("<title>A bolt with preload.png data:image/png;base64,</title>"), "nothing is saved");
     }
 }
 
