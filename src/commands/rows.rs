@@ -5,7 +5,7 @@ use crate::output::{BodyReport, Report, sci, seconds};
 
 /// What is known of the run of a case, or of several runs of it. Numbers that a run does not have are empty fields.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Row {
+pub struct CaseRow {
     /// Status of the report, or why there is none, and the status in words; the method that ran.
     pub status: String,
     pub message: String,
@@ -48,7 +48,7 @@ pub struct Row {
     pub spread: Option<f64>,
 }
 
-impl From<&Report> for Row {
+impl From<&Report> for CaseRow {
     fn from(report: &Report) -> Self {
         let largest = |of: fn(&BodyReport) -> Option<f64>| report.bodies.iter().filter_map(of).reduce(f64::max);
         let time = |phase: &str| report.times.get(phase).copied();
@@ -87,7 +87,7 @@ impl From<&Report> for Row {
     }
 }
 
-impl Row {
+impl CaseRow {
     /// Return the row of a case without results.
     pub fn unsolved(status: &str, message: &str) -> Self {
         Self { status: status.to_owned(), message: message.to_owned(), ..Self::default() }
@@ -198,7 +198,7 @@ mod tests {
         };
         // numbers that are not finite are null in JSON
         let read = serde_json::to_vec(&written).and_then(|json| serde_json::from_slice(&json));
-        let row = Row::from(&read.expect("a report"));
+        let row = CaseRow::from(&read.expect("a report"));
         let value = |name: &str| row.fields().into_iter().find(|(column, _)| column == name).expect("a column").1;
         let names = ["status", "message", "dofs", "points", "residual", "F1", "peak_pressure"];
         assert_eq!(names.map(value), ["converged", "a, b", "12", "7", "1e-9", "", "2.5"]);

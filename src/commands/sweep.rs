@@ -1,9 +1,9 @@
 //! `winkler sweep`: solve a scene for every combination of values of its keys in one process, one row of a table for
 //! each run. A run takes over what it can from the run before it.
 
-use super::cases::{Axis, Case, Plan};
+use super::cases::{Case, CaseAxis, CasePlan};
 use super::plots::Plots;
-use super::rows::Row;
+use super::rows::CaseRow;
 use super::solve::claim;
 use super::write::to_json;
 use super::{SceneArgs, Terminal, VerbosityArgs, folder_of};
@@ -120,9 +120,9 @@ fn planned(scene: &Scene) -> Vec<String> {
 }
 
 /// Return the cases of a request.
-fn plan(request: &SweepArgs) -> Result<Plan> {
-    let axes = request.over.iter().map(|text| Axis::over(text)).collect::<Result<Vec<_>>>()?;
-    let mut plan = Plan::new(axes.iter().map(|axis| axis.name.clone()).collect());
+fn plan(request: &SweepArgs) -> Result<CasePlan> {
+    let axes = request.over.iter().map(|text| CaseAxis::over(text)).collect::<Result<Vec<_>>>()?;
+    let mut plan = CasePlan::new(axes.iter().map(|axis| axis.name.clone()).collect());
     plan.add(request.scene.scene.clone(), &axes, &[], &[]);
     plan.label_cases(0);
     Ok(plan)
@@ -135,7 +135,7 @@ struct Sweep<'a> {
     terminal: Terminal,
     folder: Folder,
     bar: ProgressBar,
-    plan: &'a Plan,
+    plan: &'a CasePlan,
     /// Names of pairs and reactions, the same for all runs.
     names: Option<ResultNames>,
     /// Whether some run has load steps.
@@ -173,7 +173,7 @@ impl Sweep<'_> {
 
     /// Write the row of a run to the table, print it, and keep its report and its curves.
     fn add(&mut self, case: &Case, done: &Done, report: Report) -> Result<()> {
-        let row = Row::from(&report);
+        let row = CaseRow::from(&report);
         let scene = &done.built.scene;
         if let (Some(table), Some(names)) = (&mut self.table, &self.names) {
             let fields = self.plan.fields(case).chain(row.fields()).chain(result_fields(&report, names));

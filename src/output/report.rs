@@ -307,10 +307,10 @@ pub struct PairReport {
     /// Estimated relative errors of the pressures and of their sum, if requested.
     #[serde(flatten)]
     pub estimate: Option<PairEstimate>,
-    /// Files of its contact points and of its plot, if it has any.
+    /// File of its contact points, if it has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub table: Option<String>,
-    #[allow(missing_docs)] // with the line above
+    /// File of its plot, if it has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub plot: Option<String>,
 }
@@ -333,10 +333,10 @@ pub struct PairResult {
     /// shaft.
     #[serde(deserialize_with = "numbers")]
     pub normal_force: f64,
-    /// Least pressure of the points with c > 0, and mean pressure of the part in contact; zero without contact.
+    /// Least pressure of the points with c > 0; zero without any.
     #[serde(deserialize_with = "numbers")]
     pub least_pressure: f64,
-    #[allow(missing_docs)] // with the line above
+    /// Mean pressure of the part in contact; zero without contact.
     #[serde(deserialize_with = "numbers")]
     pub mean_pressure: f64,
     /// Largest pressure; zero where a bond only pulls.
