@@ -58,7 +58,7 @@ impl From<&Report> for CaseRow {
             message: report.message.clone(),
             method: report.method.clone(),
             dofs: Some(report.dofs),
-            points: Some(report.pairs.iter().map(|pair| pair.points).sum()),
+            points: report.pairs.iter().map(|pair| pair.points).reduce(|sum, points| sum + points),
             iterations: Some(report.iterations),
             sweeps: Some(report.sweeps),
             inner_iterations: Some(report.inner_iterations),
