@@ -19,12 +19,12 @@ pub fn number(column: impl Into<String>, value: impl Into<Option<f64>>) -> Cell 
 }
 
 /// Return the field of a count.
-pub fn count(column: impl Into<String>, value: usize) -> Cell {
+fn count(column: impl Into<String>, value: usize) -> Cell {
     (column.into(), value.to_string())
 }
 
 /// Return the fields `what_x name` and so on of a vector, one per dimension of the scene.
-pub fn vector(what: &str, name: &str, vector: &[f64; 3], dimension: usize) -> impl Iterator<Item = Cell> {
+fn vector(what: &str, name: &str, vector: &[f64; 3], dimension: usize) -> impl Iterator<Item = Cell> {
     ["x", "y", "z"]
         .into_iter()
         .zip(vector)
@@ -156,15 +156,13 @@ pub struct ResultNames {
     pub reactions: Vec<String>,
     /// Dimension of the scene.
     pub dimension: usize,
-    /// What measures the size of contacts: `length` or `area`.
-    pub measure: &'static str,
 }
 
 impl ResultNames {
     /// Return the fields of a pair in the table of runs.
     pub fn of_run(&self, pair: &PairResult, name: &str) -> Vec<Cell> {
-        let mut fields = self.pressures(pair, name);
-        fields.push(self.contact(pair, name));
+        let mut fields = pressures(pair, name);
+        fields.push(contact(pair, name));
         fields.push(number(format!("layer_energy {name}"), pair.layer_energy));
         fields.extend(vector("force", name, &pair.force[0], self.dimension));
         fields.push(number(format!("approach {name}"), pair.approach));
@@ -176,8 +174,8 @@ impl ResultNames {
     fn of_step(&self, pair: &PairResult, name: &str) -> Vec<Cell> {
         let mut fields: Vec<Cell> = vector("force", name, &pair.force[0], self.dimension).collect();
         fields.push(number(format!("approach {name}"), pair.approach));
-        fields.push(self.contact(pair, name));
-        fields.extend(self.pressures(pair, name));
+        fields.push(contact(pair, name));
+        fields.extend(pressures(pair, name));
         fields.push(count(format!("closed {name}"), pair.closed));
         if let Some(obstacle) = &pair.obstacle {
             // about z in the plane
@@ -191,29 +189,30 @@ impl ResultNames {
         fields
     }
 
-    /// Return the fields of the size of a contact.
-    fn contact(&self, pair: &PairResult, name: &str) -> Cell {
-        number(format!("contact_{} {name}", self.measure), pair.extent.contact())
-    }
-
-    /// Return the fields of the pressures of a pair and, of a bond, of the largest tension with its place.
-    fn pressures(&self, pair: &PairResult, name: &str) -> Vec<Cell> {
-        let PairResult { normal_force, mean_pressure, peak_pressure, tension, .. } = *pair;
-        let pressures =
-            [("normal_force", normal_force), ("mean_pressure", mean_pressure), ("peak_pressure", peak_pressure)];
-        let mut fields = pressures.map(|(what, value)| number(format!("{what} {name}"), value)).to_vec();
-        if let Some(TensionReport { peak_tension, peak_tension_at, .. }) = tension {
-            fields.push(number(format!("peak_tension {name}"), peak_tension));
-            fields.extend(vector("tension", name, &peak_tension_at, 3));
-        }
-        fields
-    }
-
     /// Return the fields of all reactions.
     pub fn reactions(&self, reactions: &[ReactionReport]) -> impl Iterator<Item = Cell> {
         let named = self.reactions.iter().zip(reactions);
         named.flat_map(|(name, reaction)| vector("reaction", name, &reaction.force, self.dimension))
     }
+}
+
+/// Return the field of the size of a contact.
+fn contact(pair: &PairResult, name: &str) -> Cell {
+    let what = if pair.extent.is_area() { "contact_area" } else { "contact_length" };
+    number(format!("{what} {name}"), pair.extent.contact())
+}
+
+/// Return the fields of the pressures of a pair and, of a bond, of the largest tension with its place.
+fn pressures(pair: &PairResult, name: &str) -> Vec<Cell> {
+    let PairResult { normal_force, mean_pressure, peak_pressure, tension, .. } = *pair;
+    let pressures =
+        [("normal_force", normal_force), ("mean_pressure", mean_pressure), ("peak_pressure", peak_pressure)];
+    let mut fields = pressures.map(|(what, value)| number(format!("{what} {name}"), value)).to_vec();
+    if let Some(TensionReport { peak_tension, peak_tension_at, .. }) = tension {
+        fields.push(number(format!("peak_tension {name}"), peak_tension));
+        fields.extend(vector("tension", name, &peak_tension_at, 3));
+    }
+    fields
 }
 
 impl StepTable {

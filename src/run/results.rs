@@ -220,12 +220,7 @@ pub fn names_of_results(built: &Built) -> ResultNames {
         let all = body.supports.iter().chain(&body.springs).chain(&body.rigid);
         all.map(|on| format!("{}:{on}", body.name))
     });
-    ResultNames {
-        pairs: pair_names(built),
-        reactions: numbered(reactions),
-        dimension: built.scene.dimension.value,
-        measure: built.discrete.model.pairs.first().map_or("length", |pair| pair.measure.name()),
-    }
+    ResultNames { pairs: pair_names(built), reactions: numbered(reactions), dimension: built.scene.dimension.value }
 }
 
 /// Return the reactions of bodies with these names and balances, in the order of [`names_of_results`].
