@@ -49,8 +49,10 @@ pub struct Page<'a> {
 /// `#` have numbers, and go to the right.
 struct Table<'a, T> {
     items: &'a [T],
-    columns: Vec<(String, Box<dyn Fn(&T) -> String + 'a>)>,
+    columns: Vec<(String, Cell<'a, T>)>,
 }
+
+type Cell<'a, T> = Box<dyn Fn(&T) -> String + 'a>;
 
 impl<'a, T> Table<'a, T> {
     fn of(items: &'a [T]) -> Self {
