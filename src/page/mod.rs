@@ -5,10 +5,11 @@ mod surface;
 
 pub use surface::Surface;
 
+use crate::output::closing::DIGITS;
 use crate::output::folder::REPORT;
 use crate::output::{
-    BodyReport, ForceReport, Mark, ObstacleReport, PairReport, PairResult, Plot, ReactionReport, Report, UNSETTLED,
-    busiest, escape, trimmed,
+    BodyReport, ForceReport, Mark, ObstacleReport, PairReport, PairResult, Plot, ReactionReport, Report, TensionReport,
+    UNSETTLED, busiest, escape, trimmed,
 };
 use crate::problem::{Units, label};
 use serde_json::Value;
@@ -111,9 +112,11 @@ fn digits(value: impl Into<Option<f64>>) -> String {
     }
 }
 
-/// Format a vector.
+/// Format a vector. A component that is no more than roundoff beside the largest one is zero.
 fn vector(v: &[f64]) -> String {
-    format!("({})", v.iter().map(|&x| digits(x)).collect::<Vec<_>>().join(", "))
+    let largest = v.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    let shown = |&x: &f64| digits(if x.abs() < DIGITS * largest { 0.0 } else { x });
+    format!("({})", v.iter().map(shown).collect::<Vec<_>>().join(", "))
 }
 
 /// Format a table of the settings as `key = value, ...` and a list as `(a, b)`, as text.
@@ -247,10 +250,13 @@ impl Page<'_> {
     }
 
     fn contact_table(&self) -> String {
-        let at = |is_there: bool, x: &[f64; 3]| if is_there { vector(x) } else { String::new() };
+        let peak_at = |pair: &PairReport| {
+            if pair.result.peak_pressure > 0.0 { vector(&pair.result.peak_at) } else { String::new() }
+        };
         let mut table = Table::of(&self.report.pairs)
-            .column("pair", |pair| escape(&pair.bodies.join(" – ")))
-            .column("surfaces", |pair| escape(&pair.surfaces.join(" – ")))
+            .column("bodies and surfaces", |pair| {
+                format!("{}<br>{}", escape(&pair.bodies.join(" – ")), escape(&pair.surfaces.join(" – ")))
+            })
             .column("layer", |pair| escape(&words(&self.report.settings["contact"][pair.contact]["layer"])))
             .column("#points", |pair| pair.points.to_string())
             .column(self.force("force on the first"), |pair| vector(&pair.result.force[0]))
@@ -258,16 +264,15 @@ impl Page<'_> {
             .column(self.stress("#least pressure"), |pair| digits(pair.result.least_pressure))
             .column(self.stress("#mean pressure"), |pair| digits(pair.result.mean_pressure))
             .column(self.stress("#peak pressure"), |pair| digits(pair.result.peak_pressure))
-            .column(self.length("at"), |pair| at(pair.result.peak_pressure > 0.0, &pair.result.peak_at))
+            .column(self.length("at"), peak_at)
             .column(self.extent("#extent in contact"), |pair| digits(pair.result.extent.contact()))
             .column(self.extent("#open"), |pair| digits(pair.result.extent.open()));
         if self.report.pairs.iter().any(|pair| pair.result.tension.is_some()) {
-            let tension = |pair: &PairReport| pair.result.tension.unwrap_or_default();
-            table = table
-                .column(self.stress("#largest tension"), move |pair| digits(tension(pair).peak_tension))
-                .column(self.length("at"), move |pair| {
-                    at(tension(pair).peak_tension > 0.0, &tension(pair).peak_tension_at)
-                });
+            table = table.column(self.stress("#largest tension"), |pair| {
+                let pulled = pair.result.tension.filter(|tension| tension.peak_tension > 0.0);
+                let at = |t: TensionReport| format!("{} at {}", digits(t.peak_tension), vector(&t.peak_tension_at));
+                pulled.map_or(String::new(), at)
+            });
         }
         if self.report.pairs.iter().any(|pair| !moved(&pair.result).is_empty()) {
             table = table.column("obstacle or offset", |pair| moved(&pair.result));
