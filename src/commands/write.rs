@@ -329,9 +329,13 @@ pub fn write_fields(done: &Done, recovered: &All, folder: &Folder, ended: bool) 
 pub fn write_step_tables(done: &Done, folder: &Folder) -> Result<()> {
     let (scene, step) = (&done.built.scene, done.steps.len());
     let Some(last) = done.steps.last().filter(|_| done.model().exchange.rank() == 0) else { return Ok(()) };
+    let shown = busiest(last.pairs.iter(), scene.output.pairs.unwrap_or(LISTED));
+    if shown.is_empty() {
+        return Ok(());
+    }
     folder.make_steps()?;
     let (stems, steps) = (stems(&done.built), scene.method.steps.steps.len());
-    busiest(last.pairs.iter(), scene.output.pairs.unwrap_or(LISTED)).into_iter().try_for_each(|i| {
+    shown.into_iter().try_for_each(|i| {
         let file = format!("{}.csv", stem_of(&stems[i], step, steps));
         folder.write(&file, |out| report::contact_table(done, None, i).write(out))
     })
