@@ -212,7 +212,7 @@ impl Page<'_> {
         let units = self
             .units
             .as_ref()
-            .map(|Units { length, stress, force }| format!("units: {}", [length.as_str(), stress, force].join(", ")));
+            .map(|Units { length, stress, force }| format!("Units: {}", [length.as_str(), stress, force].join(", ")));
         let lines = [Some(self.report.counts()), self.report.discretization_line(), units];
         let lines: Vec<String> = lines.into_iter().flatten().map(|line| escape(line.trim())).collect();
         lines.join("<br>\n")
