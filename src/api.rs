@@ -44,7 +44,7 @@ pub use crate::ddm::{Observer, Row, Silent, Status};
 pub use crate::error::{Error, Kind, Result};
 pub use crate::expression::Field;
 pub use crate::model::field::Unbounded;
-pub use crate::output::{BodyField, CellKind, ContactTable, PairReport, Report};
+pub use crate::output::{BodyField, CellKind, ContactTable, PairReport, PairResult, Report};
 pub use crate::petsc::Session;
 pub use crate::problem::{
     AxesSpec, BodySpec, Constants, ContactSpec, ElasticitySpec, Gamma, GroupArrays, History, LayerSpec, Linear, Load,
@@ -89,8 +89,7 @@ pub fn solve_with(session: &Session, scene: Scene, keep: &mut dyn Recorder) -> R
     let mut done = run::iterate(ready, &interrupt, keep, &mut clock)?;
     let estimate = run::estimate(&mut done, &mut clock)?;
     let recovered = results::recover(&done);
-    let mut report = report::report(session, &done, &recovered, &clock);
-    report.discretization_error = estimate.as_ref().map(report::discretization_error);
+    let report = report::report(session, &done, &recovered, estimate.as_ref(), &clock);
     Ok(Solution { done, recovered, estimate, report })
 }
 

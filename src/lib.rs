@@ -35,11 +35,11 @@ mod linalg;
 mod mesh;
 mod model;
 mod output;
+mod page;
 mod parallel;
 #[allow(unsafe_code)]
 pub mod petsc;
 mod problem;
-mod report;
 mod robin;
 mod run;
 mod scene;

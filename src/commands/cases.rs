@@ -5,7 +5,7 @@ use crate::output::tables::Cell;
 use std::path::PathBuf;
 
 /// What varies between cases.
-pub struct Axis {
+pub struct CaseAxis {
     /// Name of its column.
     pub name: String,
     /// Values in the order of the cases.
@@ -39,7 +39,7 @@ pub struct Case {
 }
 
 /// All cases of a command.
-pub struct Plan {
+pub struct CasePlan {
     /// Names of the axes.
     pub columns: Vec<String>,
     /// The combinations; the values of the last axis change first.
@@ -53,7 +53,7 @@ impl AxisValue {
     }
 }
 
-impl Axis {
+impl CaseAxis {
     /// Return an axis.
     pub fn new(name: &str, values: Vec<AxisValue>) -> Self {
         Self { name: name.to_owned(), values }
@@ -99,7 +99,7 @@ fn split(list: &str) -> Vec<String> {
     values
 }
 
-impl Plan {
+impl CasePlan {
     /// Return a plan without cases.
     pub fn new(columns: Vec<String>) -> Self {
         Self { columns, cases: Vec::new() }
@@ -107,7 +107,7 @@ impl Plan {
 
     /// Add all combinations of the axes of a scene, whose names are the columns. Overrides and PETSc options for all
     /// cases come before those of the values.
-    pub fn add(&mut self, scene: PathBuf, axes: &[Axis], overrides: &[String], petsc: &[String]) {
+    pub fn add(&mut self, scene: PathBuf, axes: &[CaseAxis], overrides: &[String], petsc: &[String]) {
         let first = Case { scene, key: vec![], label: String::new(), overrides: overrides.into(), petsc: petsc.into() };
         let with = |case: &Case, value: &AxisValue| Case {
             key: [&case.key[..], std::slice::from_ref(&value.text)].concat(),
@@ -180,13 +180,13 @@ mod tests {
 
     #[test]
     fn values_are_split_at_commas_outside_brackets_and_all_combinations_made() {
-        let texts = |axis: &Axis| axis.values.iter().map(|value| value.text.clone()).collect::<Vec<_>>();
-        let a = Axis::over("method.gamma=0.3, 0.6").expect("two numbers");
+        let texts = |axis: &CaseAxis| axis.values.iter().map(|value| value.text.clone()).collect::<Vec<_>>();
+        let a = CaseAxis::over("method.gamma=0.3, 0.6").expect("two numbers");
         assert_eq!((a.name.as_str(), texts(&a)), ("method.gamma", vec!["0.3".to_owned(), "0.6".to_owned()]));
-        let b = Axis::over("contact.0.gap=\"max(x, 1)\",0").expect("an expression and a number");
+        let b = CaseAxis::over("contact.0.gap=\"max(x, 1)\",0").expect("an expression and a number");
         assert_eq!(texts(&b), ["\"max(x, 1)\"", "0"]);
-        assert!(Axis::over("method.gamma").is_err() && Axis::over("method.gamma=1,,2").is_err());
-        let mut plan = Plan::new([&a, &b].map(|axis| axis.name.clone()).to_vec());
+        assert!(CaseAxis::over("method.gamma").is_err() && CaseAxis::over("method.gamma=1,,2").is_err());
+        let mut plan = CasePlan::new([&a, &b].map(|axis| axis.name.clone()).to_vec());
         plan.add("scene.toml".into(), &[a, b], &["x=1".to_owned()], &[]);
         plan.label_cases(0);
         assert_eq!(plan.cases.len(), 4);

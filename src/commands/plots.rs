@@ -147,7 +147,7 @@ pub fn unit_words(scene: &Scene) -> UnitWords {
 pub fn approaches(done: &Done, shown: &[usize]) -> Option<Plot> {
     let (names, steps) = (results::pair_names(&done.built), &done.steps);
     let curve = |&i: &usize| {
-        let of_step = |step: &StepReport| (step.pairs[i].approach.unwrap_or(f64::NAN), length(step.pairs[i].force));
+        let of_step = |step: &StepReport| (step.pairs[i].approach.unwrap_or(f64::NAN), length(step.pairs[i].force[0]));
         let name = if shown.len() == 1 { "" } else { &names[i] };
         Series::new(name, steps.iter().map(of_step).collect(), Style::LineMarkers)
     };

@@ -1,14 +1,11 @@
 //! The rows of `sweep` and `bench`: what a run was and what it took.
 
-use crate::output::tables::Cell;
-use crate::output::{sci, seconds};
-use serde::{Deserialize, Serialize};
-use serde_json::Value;
+use crate::output::tables::{Cell, number};
+use crate::output::{BodyReport, Report, sci, seconds};
 
 /// What is known of the run of a case, or of several runs of it. Numbers that a run does not have are empty fields.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct Row {
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct CaseRow {
     /// Status of the report, or why there is none, and the status in words; the method that ran.
     pub status: String,
     pub message: String,
@@ -24,7 +21,6 @@ pub struct Row {
     pub dense_factorizations: Option<usize>,
     pub residual: Option<f64>,
     pub increment: Option<f64>,
-    #[serde(rename = "F1")]
     pub f1: Option<f64>,
     /// Largest pressure of all pairs.
     pub peak_pressure: Option<f64>,
@@ -52,39 +48,49 @@ pub struct Row {
     pub spread: Option<f64>,
 }
 
-impl Row {
+impl From<&Report> for CaseRow {
+    fn from(report: &Report) -> Self {
+        let largest = |of: fn(&BodyReport) -> Option<f64>| report.bodies.iter().filter_map(of).reduce(f64::max);
+        let time = |phase: &str| report.times.get(phase).copied();
+        let error = largest(|body| body.error_l2);
+        Self {
+            status: report.status.clone(),
+            message: report.message.clone(),
+            method: report.method.clone(),
+            dofs: Some(report.dofs),
+            points: report.pairs.iter().map(|pair| pair.points).reduce(|sum, points| sum + points),
+            iterations: Some(report.iterations),
+            sweeps: Some(report.sweeps),
+            inner_iterations: Some(report.inner_iterations),
+            factorizations: Some(report.factorizations),
+            dense_factorizations: Some(report.dense_factorizations),
+            residual: report.residual,
+            increment: report.increment,
+            f1: report.f1,
+            peak_pressure: report.results().map(|pair| pair.peak_pressure).reduce(f64::max),
+            seconds: time("total"),
+            mesh_seconds: time("mesh"),
+            discretize_seconds: time("discretize"),
+            set_up_seconds: time("set-up"),
+            iterate_seconds: time("iterate"),
+            factor_seconds: Some(report.inner_times.factor),
+            solve_seconds: Some(report.inner_times.solve),
+            memory_mb: report.memory.get("iterate").copied(),
+            error_h1: largest(|body| body.error_h1),
+            error_energy: largest(|body| body.error_energy),
+            error_of: error.map_or(String::new(), |_| "displacement, exact".to_owned()),
+            error,
+            runs: 1,
+            cpu_seconds: None,
+            spread: None,
+        }
+    }
+}
+
+impl CaseRow {
     /// Return the row of a case without results.
     pub fn unsolved(status: &str, message: &str) -> Self {
         Self { status: status.to_owned(), message: message.to_owned(), ..Self::default() }
-    }
-
-    /// Return what a report says.
-    pub fn of_report(report: &Value) -> Self {
-        let number = |path: &str| report.pointer(path).and_then(Value::as_f64);
-        let pairs = report["pairs"].as_array().filter(|pairs| !pairs.is_empty());
-        let own = match Self::deserialize(report) {
-            Ok(own) => own,
-            Err(cause) => return Self::unsolved("failed", &format!("its report cannot be read: {cause}")),
-        };
-        Self {
-            points: pairs.map(|pairs| pairs.iter().filter_map(|pair| pair["points"].as_u64()).sum::<u64>() as usize),
-            peak_pressure: largest(&report["pairs"], "peak_pressure"),
-            seconds: number("/times/total"),
-            mesh_seconds: number("/times/mesh"),
-            discretize_seconds: number("/times/discretize"),
-            set_up_seconds: number("/times/set-up"),
-            iterate_seconds: number("/times/iterate"),
-            factor_seconds: number("/inner_times/factor"),
-            solve_seconds: number("/inner_times/solve"),
-            memory_mb: number("/memory/iterate"),
-            error: largest(&report["bodies"], "error_l2"),
-            error_h1: largest(&report["bodies"], "error_h1"),
-            error_energy: largest(&report["bodies"], "error_energy"),
-            error_of: largest(&report["bodies"], "error_l2")
-                .map_or(String::new(), |_| "displacement, exact".to_owned()),
-            runs: 1,
-            ..own
-        }
     }
 
     /// Set the error, and what it is measured in and against.
@@ -99,13 +105,43 @@ impl Row {
 
     /// Return the fields of the row.
     pub fn fields(&self) -> Vec<Cell> {
-        let mut csv = csv::Writer::from_writer(Vec::new());
-        // writing to memory does not fail
-        let _ = csv.serialize(self);
-        let bytes = csv.into_inner().unwrap_or_default();
-        let mut lines = csv::ReaderBuilder::new().has_headers(false).from_reader(&bytes[..]).into_records().flatten();
-        let (names, texts) = (lines.next().unwrap_or_default(), lines.next().unwrap_or_default());
-        names.iter().zip(&texts).map(|(name, text)| (name.to_owned(), text.to_owned())).collect()
+        let text = |column: &str, text: &str| (column.to_owned(), text.to_owned());
+        let count = |(column, value): (&str, Option<usize>)| {
+            (column.to_owned(), value.map_or(String::new(), |value| value.to_string()))
+        };
+        let counts = [
+            ("dofs", self.dofs),
+            ("points", self.points),
+            ("iterations", self.iterations),
+            ("sweeps", self.sweeps),
+            ("inner_iterations", self.inner_iterations),
+            ("factorizations", self.factorizations),
+            ("dense_factorizations", self.dense_factorizations),
+        ];
+        let numbers = [
+            ("residual", self.residual),
+            ("increment", self.increment),
+            ("F1", self.f1),
+            ("peak_pressure", self.peak_pressure),
+            ("seconds", self.seconds),
+            ("mesh_seconds", self.mesh_seconds),
+            ("discretize_seconds", self.discretize_seconds),
+            ("set_up_seconds", self.set_up_seconds),
+            ("iterate_seconds", self.iterate_seconds),
+            ("factor_seconds", self.factor_seconds),
+            ("solve_seconds", self.solve_seconds),
+            ("memory_mb", self.memory_mb),
+            ("error_h1", self.error_h1),
+            ("error_energy", self.error_energy),
+            ("error", self.error),
+        ];
+        let mut fields =
+            vec![text("status", &self.status), text("message", &self.message), text("method", &self.method)];
+        fields.extend(counts.map(count));
+        fields.extend(numbers.map(|(column, value)| number(column, value)));
+        fields.extend([text("error_of", &self.error_of), count(("runs", Some(self.runs)))]);
+        fields.extend([number("cpu_seconds", self.cpu_seconds), number("spread", self.spread)]);
+        fields
     }
 
     /// Return the row as a line for the terminal.
@@ -128,11 +164,6 @@ impl Row {
     }
 }
 
-/// Return the largest number of this name in a list of bodies or pairs.
-fn largest(list: &Value, key: &str) -> Option<f64> {
-    list.as_array()?.iter().filter_map(|item| item[key].as_f64()).reduce(f64::max)
-}
-
 /// Return rows of texts as a table with columns to the right, all but the first `left` ones.
 pub fn aligned(rows: &[Vec<String>], left: usize) -> String {
     let count = rows.first().map_or(0, Vec::len);
@@ -148,17 +179,29 @@ pub fn aligned(rows: &[Vec<String>], left: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::output::{PairReport, PairResult};
 
     #[test]
     fn a_row_stands_under_its_columns() {
-        let report = serde_json::json!({
-            "status": "converged", "message": "a, b", "residual": 1e-9, "dofs": 12,
-            "pairs": [{ "points": 3, "peak_pressure": null }, { "points": 4 }],
-        });
-        let row = Row::of_report(&report);
+        let pair = |points: usize, peak_pressure: f64| PairReport {
+            points,
+            result: PairResult { peak_pressure, ..PairResult::default() },
+            ..PairReport::default()
+        };
+        let written = Report {
+            status: "converged".to_owned(),
+            message: "a, b".to_owned(),
+            residual: Some(1e-9),
+            dofs: 12,
+            pairs: vec![pair(3, f64::NAN), pair(4, 2.5)],
+            ..Report::default()
+        };
+        // numbers that are not finite are null in JSON
+        let read = serde_json::to_vec(&written).and_then(|json| serde_json::from_slice(&json));
+        let row = CaseRow::from(&read.expect("a report"));
         let value = |name: &str| row.fields().into_iter().find(|(column, _)| column == name).expect("a column").1;
         let names = ["status", "message", "dofs", "points", "residual", "F1", "peak_pressure"];
-        assert_eq!(names.map(value), ["converged", "a, b", "12", "7", "1e-9", "", ""]);
+        assert_eq!(names.map(value), ["converged", "a, b", "12", "7", "1e-9", "", "2.5"]);
     }
 
     #[test]

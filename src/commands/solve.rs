@@ -4,7 +4,7 @@ use super::adapt::AdaptiveRun;
 use super::checkpoint::{self, Checkpoint};
 use super::plots::unit_words;
 use super::shortfall::Shortfall;
-use super::write::{ResultFiles, planned, planned_on_mesh, to_json, write_fields};
+use super::write::{ResultFiles, planned, planned_on_mesh, to_json, write_fields, write_step_tables};
 use super::{SceneArgs, Terminal, VerbosityArgs, clock_with_phases, folder_of, inputs};
 use crate::ddm::{Observer, Row, Status};
 use crate::error::{Error, Result};
@@ -351,8 +351,7 @@ impl Recorder for Solver<'_> {
         let is_interrupted = matches!(done.outcome.status, Status::Interrupted { .. });
         let ends = done.steps.len() == history.steps.len() || is_interrupted;
         if !ends {
-            let written = write_fields(done, recovered, &self.folder, false);
-            self.note(written);
+            self.note(write_step_tables(done, &self.folder).and(write_fields(done, recovered, &self.folder, false)));
         }
     }
 }

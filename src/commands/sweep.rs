@@ -1,9 +1,9 @@
 //! `winkler sweep`: solve a scene for every combination of values of its keys in one process, one row of a table for
 //! each run. A run takes over what it can from the run before it.
 
-use super::cases::{Axis, Case, Plan};
+use super::cases::{Case, CaseAxis, CasePlan};
 use super::plots::Plots;
-use super::rows::Row;
+use super::rows::CaseRow;
 use super::solve::claim;
 use super::write::to_json;
 use super::{SceneArgs, Terminal, VerbosityArgs, folder_of};
@@ -84,8 +84,7 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &SweepArgs) -> R
         let mut done = run::iterate(ready, interrupt, &mut requests, &mut clock)?;
         let estimate = run::estimate(&mut done, &mut clock)?;
         clock.total();
-        let mut report = report::report(session, &done, &results::recover(&done), &clock);
-        report.discretization_error = estimate.as_ref().map(report::discretization_error);
+        let report = report::report(session, &done, &results::recover(&done), estimate.as_ref(), &clock);
         exit = exit.max(verdict::exit_code(&done));
         if session.rank() == 0 {
             sweep.add(case, &done, report)?;
@@ -121,9 +120,9 @@ fn planned(scene: &Scene) -> Vec<String> {
 }
 
 /// Return the cases of a request.
-fn plan(request: &SweepArgs) -> Result<Plan> {
-    let axes = request.over.iter().map(|text| Axis::over(text)).collect::<Result<Vec<_>>>()?;
-    let mut plan = Plan::new(axes.iter().map(|axis| axis.name.clone()).collect());
+fn plan(request: &SweepArgs) -> Result<CasePlan> {
+    let axes = request.over.iter().map(|text| CaseAxis::over(text)).collect::<Result<Vec<_>>>()?;
+    let mut plan = CasePlan::new(axes.iter().map(|axis| axis.name.clone()).collect());
     plan.add(request.scene.scene.clone(), &axes, &[], &[]);
     plan.label_cases(0);
     Ok(plan)
@@ -136,7 +135,7 @@ struct Sweep<'a> {
     terminal: Terminal,
     folder: Folder,
     bar: ProgressBar,
-    plan: &'a Plan,
+    plan: &'a CasePlan,
     /// Names of pairs and reactions, the same for all runs.
     names: Option<ResultNames>,
     /// Whether some run has load steps.
@@ -174,7 +173,7 @@ impl Sweep<'_> {
 
     /// Write the row of a run to the table, print it, and keep its report and its curves.
     fn add(&mut self, case: &Case, done: &Done, report: Report) -> Result<()> {
-        let row = Row::of_report(&serde_json::json!(report));
+        let row = CaseRow::from(&report);
         let scene = &done.built.scene;
         if let (Some(table), Some(names)) = (&mut self.table, &self.names) {
             let fields = self.plan.fields(case).chain(row.fields()).chain(result_fields(&report, names));
@@ -190,7 +189,7 @@ impl Sweep<'_> {
             self.bar.suspend(|| say(row.line(&case.label)))?;
         }
         let most = scene.output.pairs.unwrap_or(LISTED);
-        let shown = self.shown.get_or_insert_with(|| busiest(&report.pairs, most));
+        let shown = self.shown.get_or_insert_with(|| busiest(report.results(), most));
         self.plots.add(&case.label, done, shown);
         self.reports.push(report);
         Ok(())
@@ -214,18 +213,11 @@ impl Sweep<'_> {
 
 /// Return the fields of all pairs and reactions.
 fn result_fields(report: &Report, names: &ResultNames) -> Vec<Cell> {
-    let mut fields = Vec::new();
-    let estimates = report.discretization_error.iter().flat_map(|error| error.pressure.iter().zip(&names.pairs));
-    fields.extend(estimates.map(|(error, name)| tables::number(format!("pressure_estimate {name}"), *error)));
-    for (pair, name) in report.pairs.iter().zip(&names.pairs) {
-        fields.push(tables::number(format!("normal_force {name}"), pair.normal_force));
-        fields.push(tables::number(format!("mean_pressure {name}"), pair.mean_pressure));
-        fields.extend(tables::peaks(name, pair.peak_pressure, pair.tension));
-        fields.push(names.contact(name, &pair.extent));
-        fields.push(tables::number(format!("layer_energy {name}"), pair.layer_energy));
-        fields.extend(tables::vector("force", name, &pair.force[0], names.dimension));
-        fields.push(tables::number(format!("approach {name}"), pair.approach));
-    }
+    let pairs = || report.pairs.iter().zip(&names.pairs);
+    let estimates = pairs().filter_map(|(pair, name)| Some((pair.estimate?.pressure_estimate, name)));
+    let mut fields: Vec<Cell> =
+        estimates.map(|(error, name)| tables::number(format!("pressure_estimate {name}"), error)).collect();
+    fields.extend(pairs().flat_map(|(pair, name)| names.of_run(&pair.result, name)));
     fields.extend(names.reactions(&results::reported(&report.bodies)));
     fields
 }

@@ -4,7 +4,6 @@
 use super::adapt::AdaptiveRun;
 use super::checkpoint;
 use super::plots::{self, Plots};
-use crate::contact::ContactPair;
 use crate::discretize::{BodyInfo, corners};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::Estimate;
@@ -12,9 +11,9 @@ use crate::exchange::{all_gather, gather};
 use crate::output::folder::{MARK_OF_MESH, REPORT, STEPS};
 use crate::output::views::Tags;
 use crate::output::vtu::{self, CollectionEntry, write_pvd};
-use crate::output::{Folder, LISTED, PairReport, PairRow, Report, busiest, safe_name, tables};
+use crate::output::{Folder, LISTED, PairReport, Report, busiest, safe_name, tables};
+use crate::page::{self, Page, Surface};
 use crate::petsc::Session;
-use crate::report::{self as page, Page, Surface};
 use crate::run::results::{self, pair_names};
 use crate::run::{All, Built, Clock, Done, Recovered, report};
 use crate::scene::{Precision, Scene};
@@ -47,14 +46,14 @@ impl ResultFiles<'_> {
         let output = &done.built.scene.output;
         let is_first = session.rank() == 0;
         let recovered = results::recover(done);
-        let mut report = report::report(session, done, &recovered, clock);
-        report.discretization_error = self.estimate.map(report::discretization_error);
+        let mut report = report::report(session, done, &recovered, self.estimate, clock);
         report.rounds.clone_from(&self.plan.rounds);
         change(&mut report);
-        let shown = busiest(&report.pairs, output.pairs.unwrap_or(LISTED));
+        let shown = busiest(report.results(), output.pairs.unwrap_or(LISTED));
         report.left_out = left_out(&report.pairs, &shown);
         let mut plots = Plots::default();
         plots.add("pressure", done, &shown);
+        self.name_files(&mut report, &shown, &plots);
         let mut written = if is_first { self.tables_and_plots(&report, &shown, &plots) } else { Ok(()) };
         if let Some(mesh) = done.built.file.as_ref().filter(|_| self.fields && self.plan.adapts()) {
             written = written.and(copy_mesh(folder, &mesh.path));
@@ -81,23 +80,24 @@ impl ResultFiles<'_> {
         (report, failed.map_or(written, Err))
     }
 
+    /// Name the table and the plot of each pair that is shown.
+    fn name_files(&self, report: &mut Report, shown: &[usize], plots: &Plots) {
+        let stems = stems(&self.done.built);
+        shown.iter().for_each(|&i| report.pairs[i].table = Some(format!("{}.csv", stems[i])));
+        let drawn = plots.files().filter(|_| self.done.built.scene.output.plots);
+        drawn.for_each(|(i, file)| report.pairs[i].plot = Some(file));
+    }
+
     /// Write the table of all pairs, a table for each of the pairs that are shown, and the plots if the scene wants
     /// them.
     fn tables_and_plots(&self, report: &Report, shown: &[usize], plots: &Plots) -> Result<()> {
         let (folder, done) = (self.folder, self.done);
-        let has_plots = done.built.scene.output.plots;
-        let (model, layer) = (done.model(), &done.outcome.layer);
-        let compression = |i: usize| &layer.compression[model.range(i)];
-        let row = |(i, pair): (usize, &ContactPair)| PairRow::new(&pair.area, &pair.gap, compression(i));
-        let mut rows: Vec<PairRow> = model.pairs.iter().enumerate().map(row).collect();
-        let stems = stems(&done.built);
-        shown.iter().for_each(|&i| rows[i].table = format!("{}.csv", stems[i]));
-        plots.files().filter(|_| has_plots).for_each(|(i, file)| rows[i].plot = file);
-        tables::save(folder, &report.pairs, &rows)?;
-        for &i in shown {
+        tables::save(folder, &report.pairs)?;
+        for (i, file) in report.pairs.iter().enumerate().filter_map(|(i, pair)| Some((i, pair.table.as_ref()?))) {
             let table = report::contact_table(done, self.estimate, i);
-            folder.write(&rows[i].table, |out| table.write(out))?;
+            folder.write(file, |out| table.write(out))?;
         }
+        let has_plots = done.built.scene.output.plots;
         if !has_plots {
             return Ok(());
         }
@@ -132,7 +132,10 @@ impl ResultFiles<'_> {
             bodies,
             marks: &done.built.marks,
             contacts: in_space
-                .map(|&i| Surface::of_contact(report::contact_surface(&names[i], done, i, &displacement[i])))
+                .map(|&i| {
+                    let surface = report::contact_surface(&names[i], done, i, &displacement[i]);
+                    Surface::of_contact(surface, done.model().pairs[i].bodies[0])
+                })
                 .collect(),
             pressures: plots.pressures().collect(),
             approach: plots::approaches(done, shown),
@@ -148,6 +151,7 @@ impl ResultFiles<'_> {
         let mut of_ranks = field_files(&done.built, &|name| safe_name(name));
         for step in 1..=done.steps.len() {
             of_ranks.extend(field_files(&done.built, &|name| stem_of(name, step, steps)));
+            of_ranks.extend(stems(&done.built).iter().map(|stem| format!("{}.csv", stem_of(stem, step, steps))));
         }
         of_ranks.retain(|name| self.folder.path().join(name).is_file());
         let mut names = [self.folder.files(), of_ranks, vec![REPORT.to_owned()]].concat();
@@ -176,6 +180,7 @@ fn mark(bodies: &mut [Surface], done: &Done) {
         points.get(&corners(facet.iter().copied())).is_some_and(|[all, closed]| *closed > 0 && 2 * closed >= *all)
     };
     for (index, body) in bodies.iter_mut().enumerate() {
+        body.body = index;
         body.mark(done.built.marks.iter().filter(|mark| mark.body == index), &is_closed);
     }
 }
@@ -224,8 +229,9 @@ pub fn planned_on_mesh(built: &Built) -> Vec<String> {
     let mut fields = field_files(built, &|name| safe_name(name));
     fields.extend(stems.iter().flat_map(|stem| ["vtu", "msh"].map(|ending| format!("{stem}.{ending}"))));
     fields.retain(|file| if file.ends_with("msh") { output.msh } else { output.vtu });
-    for step in (1..steps).filter(|_| output.vtu) {
-        fields.extend(field_files(built, &|name| stem_of(name, step, steps)));
+    for step in 1..steps {
+        fields.extend(stems.iter().map(|stem| format!("{}.csv", stem_of(stem, step, steps))));
+        fields.extend(field_files(built, &|name| stem_of(name, step, steps)).into_iter().filter(|_| output.vtu));
     }
     [planned(scene), stems.iter().map(|stem| format!("{stem}.csv")).collect(), fields].concat()
 }
@@ -316,6 +322,23 @@ pub fn write_fields(done: &Done, recovered: &All, folder: &Folder, ended: bool) 
     let stem = |name: &str| if ended { safe_name(name) } else { stem_of(name, step, steps) };
     fields(done, recovered, folder, &stem, &displacement)?;
     collection(done, folder, ended)
+}
+
+/// Write the tables of contact points at the end of a load step before the last, on the first rank: those of the pairs
+/// with the largest forces of the step.
+pub fn write_step_tables(done: &Done, folder: &Folder) -> Result<()> {
+    let (scene, step) = (&done.built.scene, done.steps.len());
+    let Some(last) = done.steps.last().filter(|_| done.model().exchange.rank() == 0) else { return Ok(()) };
+    let shown = busiest(last.pairs.iter(), scene.output.pairs.unwrap_or(LISTED));
+    if shown.is_empty() {
+        return Ok(());
+    }
+    folder.make_steps()?;
+    let (stems, steps) = (stems(&done.built), scene.method.steps.steps.len());
+    shown.into_iter().try_for_each(|i| {
+        let file = format!("{}.csv", stem_of(&stems[i], step, steps));
+        folder.write(&file, |out| report::contact_table(done, None, i).write(out))
+    })
 }
 
 /// Write bodies and contact surfaces for Gmsh, each file with tags of its own.

@@ -1,8 +1,8 @@
 //! The closing lines of a run for the terminal: counts, errors, pairs, bodies, balances and warnings of a report.
 
 use super::report::{
-    BalanceReport, BodyReport, ForceReport, IntervalReport, LISTED, ObstacleReport, PairReport, Report, RoundReport,
-    StepReport, TensionReport, UnmetReport, busiest,
+    BalanceReport, BodyReport, ForceReport, IntervalReport, LISTED, ObstacleReport, PairReport, PairResult, Report,
+    RoundReport, StepReport, TensionReport, UnmetReport, busiest,
 };
 use super::{sci, seconds};
 use std::collections::BTreeSet;
@@ -95,7 +95,7 @@ impl Report {
             lines.extend(self.steps.iter().enumerate().map(|(index, step)| self.step_line(index + 1, step, units)));
         }
         lines.extend(self.left_out.iter().map(|left_out| format!("  {left_out}")));
-        let listed = busiest(&self.pairs, LISTED).into_iter().map(|i| &self.pairs[i]);
+        let listed = busiest(self.results(), LISTED).into_iter().map(|i| &self.pairs[i]);
         // where loads push bodies without end, or against nothing, there is no state of them to tell
         if !self.has_no_state() {
             lines.extend(listed.map(|pair| pair_line(pair, self.is_bonded(pair), units)));
@@ -110,14 +110,14 @@ impl Report {
     }
 
     /// Return whether the run ended since the loads have no equilibrium.
-    fn has_no_state(&self) -> bool {
+    pub fn has_no_state(&self) -> bool {
         // of a history the state is that of its last step
         let status = self.steps.last().map_or(&self.status, |step| &step.status);
         matches!(status.as_str(), "underconstrained" | "unbounded")
     }
 
     /// Return the line with the counters, errors and times.
-    fn counts(&self) -> String {
+    pub fn counts(&self) -> String {
         let error = match (self.error_bound, self.error_estimate) {
             (Some(error), _) => format!(", error at most {}", sci(error, 2)),
             (None, Some(error)) => format!(", estimated error {}", sci(error, 2)),
@@ -136,15 +136,15 @@ impl Report {
         )
     }
 
-    /// Return the line on the estimated error of the discretisation.
-    fn discretization_line(&self) -> Option<String> {
+    /// Return the line on the estimated error of the discretisation, the largest of the pairs.
+    pub fn discretization_line(&self) -> Option<String> {
         let error = self.discretization_error.as_ref()?;
-        let words = |errors: &[f64]| errors.iter().map(|&error| sci(error, 1)).collect::<Vec<_>>().join(" and ");
+        let largest = |errors: &[f64]| sci(errors.iter().copied().fold(f64::NAN, f64::max), 1);
         Some(format!(
             "  estimated discretisation error: pressure {}, displacement {}, force {}, energy norm {}",
-            words(&error.pressure),
+            largest(&error.pressure),
             sci(error.displacement, 1),
-            words(&error.force),
+            largest(&error.force),
             sci(error.energy, 1)
         ))
     }
@@ -172,7 +172,7 @@ impl Report {
             ..=LISTED => {
                 let pairs = step.pairs.iter().zip(&self.pairs).map(|(at, pair)| {
                     let ([a, b], on) = (&pair.surfaces, &pair.bodies[0]);
-                    let (peak, sum) = (peaks(at.peak_pressure, None, at.tension, units), units.vector(at.force, 0.0));
+                    let (peak, sum) = (peaks(at, false, units), units.vector(at.force[0], 0.0));
                     let closed = if self.is_bonded(pair) { "compressed" } else { "closed" };
                     format!("{a} - {b}: force on `{on}` {sum}{force}, {peak}, {} points {closed}", at.closed)
                 });
@@ -233,44 +233,46 @@ fn largest(displacement: Option<f64>, von_mises: Option<f64>, place: &str, units
 
 /// Return the line of a pair, which its surfaces name in the order of the scene.
 fn pair_line(pair: &PairReport, is_bonded: bool, units: &UnitWords) -> String {
-    let ([a, b], on) = (&pair.surfaces, &pair.bodies[0]);
-    let is_pulled = pair.tension.is_some_and(|tension| tension.peak_tension > 0.0);
-    if pair.peak_pressure <= 0.0 && !is_pulled || pair.peak_pressure.is_nan() {
+    let (PairReport { surfaces: [a, b], bodies: [on, _], result, estimate, .. }, extent) = (pair, pair.result.extent);
+    let is_pulled = result.tension.is_some_and(|tension| tension.peak_tension > 0.0);
+    if result.peak_pressure <= 0.0 && !is_pulled || result.peak_pressure.is_nan() {
         return format!("  {a} - {b}: no contact");
     }
-    let UnitWords { extent, force, length, .. } = units;
+    let UnitWords { extent: size, force, length, .. } = units;
     let moved = |ObstacleReport { approach, tilt, moment, .. }: &ObstacleReport| {
         let turned = || format!(", tilt {}, moment {}", vector(tilt, 0.0, 6), vector(moment, 0.0, 6));
         let turned = if *tilt == [0.0; 3] { String::new() } else { turned() };
         format!(", approach {}{length}{turned}", sci(*approach, 5))
     };
-    let offset = pair.offset.map(|offset| format!(", offset {}{length}", sci(offset, 5)));
-    let more = pair.obstacle.as_ref().map(moved).or(offset).unwrap_or_default();
-    let what = if pair.extent.is_area() { "area" } else { "length" };
+    let offset = result.offset.map(|offset| format!(", offset {}{length}", sci(offset, 5)));
+    let more = result.obstacle.as_ref().map(moved).or(offset).unwrap_or_default();
+    let what = if extent.is_area() { "area" } else { "length" };
     let [closed, open] = if is_bonded { ["compressed", "pulled"] } else { ["in contact", "open"] };
-    let peak = pair.peak_pressure.max(pair.tension.map_or(0.0, |tension| tension.peak_tension));
-    let scale = peak * (pair.extent.contact() + pair.extent.open());
+    let peak = result.peak_pressure.max(result.tension.map_or(0.0, |tension| tension.peak_tension));
+    let scale = peak * (extent.contact() + extent.open());
+    let error = estimate.map(|errors| format!(", estimated error of pressures {}", sci(errors.pressure_estimate, 1)));
     format!(
-        "  {a} - {b}: force on `{on}` {}{force}, normal force {}{force}{more}, {}, {what} {closed} {}{extent}, {open} {}{extent}",
-        units.vector(pair.force[0], scale),
-        readable(pair.normal_force, 6),
-        peaks(pair.peak_pressure, Some((pair.peak_at, pair.mean_pressure)), pair.tension, units),
-        readable(pair.extent.contact(), 6),
-        readable(pair.extent.open(), 6)
+        "  {a} - {b}: force on `{on}` {}{force}, normal force {}{force}{more}, {}, {what} {closed} {}{size}, {open} {}{size}{}",
+        units.vector(result.force[0], scale),
+        readable(result.normal_force, 6),
+        peaks(result, true, units),
+        readable(extent.contact(), 6),
+        readable(extent.open(), 6),
+        error.unwrap_or_default()
     )
 }
 
-/// Return the words on the largest pressure, with its place and the mean pressure where they are given, and on the
-/// largest tension of a bond. A bond that only pulls has no pressure.
-fn peaks(pressure: f64, more: Option<([f64; 3], f64)>, tension: Option<TensionReport>, units: &UnitWords) -> String {
+/// Return the words on the largest pressure, with its place and other pressures if `is_whole`, and on the largest
+/// tension of a bond. A bond that only pulls has no pressure.
+fn peaks(result: &PairResult, is_whole: bool, units: &UnitWords) -> String {
     let stress = &units.stress;
-    let tension = tension.filter(|tension| tension.peak_tension > 0.0);
+    let tension = result.tension.filter(|tension| tension.peak_tension > 0.0);
     let mut words = Vec::new();
-    if pressure > 0.0 || tension.is_none() {
-        let more = more.map_or(String::new(), |(at, mean)| {
-            format!(" at {}, mean pressure {}{stress}", units.point(at), readable(mean, 6))
-        });
-        words.push(format!("peak pressure {}{stress}{more}", readable(pressure, 6)));
+    if result.peak_pressure > 0.0 || tension.is_none() {
+        let [least, mean] = [result.least_pressure, result.mean_pressure].map(|pressure| readable(pressure, 6));
+        let others = format!(" at {}, mean {mean}{stress}, least {least}{stress}", units.point(result.peak_at));
+        let others = if is_whole { others } else { String::new() };
+        words.push(format!("peak pressure {}{stress}{others}", readable(result.peak_pressure, 6)));
     }
     words.extend(tension.map(|TensionReport { peak_tension, peak_tension_at, .. }| {
         format!("largest tension {}{stress} at {}", readable(peak_tension, 6), units.point(peak_tension_at))

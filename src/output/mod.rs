@@ -22,9 +22,10 @@ pub use mark::{Mark, Role};
 pub use plot::{Color, Plot, PlotAxis, Series, Style};
 pub use report::{
     BalanceReport, BodyReport, EstimateReport, Extent, ForceReport, InnerTimes, IntervalReport, LISTED, ObstacleReport,
-    PairReport, ReactionReport, Report, RoundReport, StepPairReport, StepReport, TensionReport, UnmetReport, busiest,
+    PairEstimate, PairReport, PairResult, ReactionReport, Report, RoundReport, StepReport, TensionReport, UnmetReport,
+    busiest,
 };
-pub use tables::{ContactTable, HistoryWriter, PairRow, ResultNames, RowFile, StepTable};
+pub use tables::{ContactTable, HistoryWriter, ResultNames, RowFile, StepTable};
 pub use terminal::IterationTable;
 
 use crate::error::{Error, Result};

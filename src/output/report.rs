@@ -1,11 +1,13 @@
 //! The report of a run, which becomes `report.json`, and its closing lines on the terminal.
 
-use serde::{Deserialize, Serialize};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
 /// The report of a run. Lengths, forces and energies are in the units of the scene.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Report {
     /// Version of the program.
     pub winkler: String,
@@ -118,7 +120,7 @@ pub struct Report {
 }
 
 /// The intervals of gamma by theorem 3 on the level set of the start. They begin at zero, which is excluded.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct IntervalReport {
     /// End of the interval (33), 2 lower/upper^2; null where `lower` is zero.
     pub theorem: Option<f64>,
@@ -131,7 +133,7 @@ pub struct IntervalReport {
 }
 
 /// The wall seconds of the inner solvers.
-#[derive(Debug, Clone, Copy, Default, Serialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub struct InnerTimes {
     /// Factorisations and preconditioner set-ups.
     pub factor: f64,
@@ -142,19 +144,25 @@ pub struct InnerTimes {
 }
 
 /// Estimated relative errors of the discretisation.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct EstimateReport {
     /// Error in the energy norm of bodies and layers.
+    #[serde(deserialize_with = "numbers")]
     pub energy: f64,
     /// Error of the nodal values in the same norm.
+    #[serde(deserialize_with = "numbers")]
     pub nodal: f64,
     /// Error of the normal displacements at the contact points, root of mean squares.
+    #[serde(deserialize_with = "numbers")]
     pub displacement: f64,
     /// Error of the pressures at the contact points of each pair, root of mean squares.
+    #[serde(deserialize_with = "numbers")]
     pub pressure: Vec<f64>,
     /// Error of the sum of the pressures of each pair.
+    #[serde(deserialize_with = "numbers")]
     pub force: Vec<f64>,
     /// Fraction of the squared energy error in each body, in the order of the scene.
+    #[serde(deserialize_with = "numbers")]
     pub bodies: Vec<f64>,
 }
 
@@ -194,7 +202,7 @@ pub struct RoundReport {
 }
 
 /// The report of a body.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct BodyReport {
     /// Name.
     pub name: String,
@@ -239,18 +247,20 @@ pub struct BodyReport {
 }
 
 /// A force and its moment about the origin (x, y, z), with its source.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct ForceReport {
     /// Source of the force: the physical group of a support, spring or rigid surface, or `loads`, or `contacts`.
     pub on: String,
     /// The force.
+    #[serde(deserialize_with = "numbers")]
     pub force: [f64; 3],
     /// The moment.
+    #[serde(deserialize_with = "numbers")]
     pub moment: [f64; 3],
 }
 
 /// The forces on a body. Their sum is zero in equilibrium.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct BalanceReport {
     /// Loads, except for those on rigid surfaces.
     pub loads: ForceReport,
@@ -264,14 +274,16 @@ pub struct BalanceReport {
     /// or is that of the loads on a surface that turns.
     pub rigid: Vec<ForceReport>,
     /// Norm of the sum of all forces, relative to the sum of the norms of all nodal forces.
+    #[serde(deserialize_with = "numbers")]
     pub force_imbalance: f64,
     /// The same ratio for moments about the origin, or about a point near the mesh if the origin is far away
     /// (docs/meshes.md).
+    #[serde(deserialize_with = "numbers")]
     pub moment_imbalance: f64,
 }
 
 /// The report of a pair of surfaces. Sides are in the order of the scene.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct PairReport {
     /// Names of the surfaces.
     pub surfaces: [String; 2],
@@ -289,24 +301,52 @@ pub struct PairReport {
     pub pieces_lost: usize,
     /// Partially covered facets of the carrier, which use plain means.
     pub facets_averaged: usize,
-    /// Energy of the layer, J.
-    pub layer_energy: f64,
+    /// The result at the end of the run.
+    #[serde(flatten)]
+    pub result: PairResult,
+    /// Estimated relative errors of the pressures and of their sum, if requested.
+    #[serde(flatten)]
+    pub estimate: Option<PairEstimate>,
+    /// File of its contact points, if it has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub table: Option<String>,
+    /// File of its plot, if it has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub plot: Option<String>,
+}
+
+/// The result of a pair of surfaces at the end of a run or of a load step.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct PairResult {
+    /// Contact points with c > 0.
+    pub closed: usize,
     /// Contact force on each side (x, y, z).
+    #[serde(deserialize_with = "numbers")]
     pub force: [[f64; 3]; 2],
     /// Moment of the contact force about the origin (x, y, z).
+    #[serde(deserialize_with = "numbers")]
     pub moment: [[f64; 3]; 2],
     /// Approach of the bodies along the mean normal; null where normals cancel.
     pub approach: Option<f64>,
     /// Sum of the pressures times their areas. It is not the resultant of `force` where normals differ, as around a
     /// shaft.
+    #[serde(deserialize_with = "numbers")]
     pub normal_force: f64,
-    /// Mean pressure of the part in contact.
+    /// Least pressure of the points with c > 0; zero without any.
+    #[serde(deserialize_with = "numbers")]
+    pub least_pressure: f64,
+    /// Mean pressure of the part in contact; zero without contact.
+    #[serde(deserialize_with = "numbers")]
     pub mean_pressure: f64,
     /// Largest pressure; zero where a bond only pulls.
+    #[serde(deserialize_with = "numbers")]
     pub peak_pressure: f64,
     /// Point of the largest pressure (x, y, z).
+    #[serde(deserialize_with = "numbers")]
     pub peak_at: [f64; 3],
     /// Largest compression of the layer; negative where all of it is open.
+    #[serde(deserialize_with = "numbers")]
     pub peak_compression: f64,
     /// The largest tension, if the pair is bonded.
     #[serde(flatten)]
@@ -317,22 +357,45 @@ pub struct PairReport {
     /// Plane problems: points where contact begins or ends, from the pressure and the opening of the contact points on
     /// both sides (docs/theory.md).
     pub contact_ends: Vec<[f64; 3]>,
+    /// Initial gap d at the points: least, mean over the area, largest.
+    #[serde(deserialize_with = "numbers")]
+    pub gap: [f64; 3],
+    /// Distance of the surfaces after deformation, -c where that is positive: mean over the area of all points, and
+    /// largest.
+    #[serde(deserialize_with = "numbers")]
+    pub opening: [f64; 2],
+    /// Energy of the layer.
+    #[serde(deserialize_with = "numbers")]
+    pub layer_energy: f64,
     /// The obstacle before the surface, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub obstacle: Option<ObstacleReport>,
-    /// Closing of the gap (a length) that was found for the force or preload of the pair.
+    /// Closing of the gap (a length) that was found for the force or preload of the pair, or that a step keeps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub offset: Option<f64>,
+}
+
+/// Estimated relative errors of a pair: of its pressures, and of the sum of the pressures times their areas.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs)] // the names are those of the report
+pub struct PairEstimate {
+    #[serde(deserialize_with = "numbers")]
+    pub pressure_estimate: f64,
+    #[serde(deserialize_with = "numbers")]
+    pub force_estimate: f64,
 }
 
 /// The tension of a bonded layer.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct TensionReport {
     /// Largest tension; zero where the bond is only pressed.
+    #[serde(deserialize_with = "numbers")]
     pub peak_tension: f64,
     /// Point of the largest tension (x, y, z).
+    #[serde(deserialize_with = "numbers")]
     pub peak_tension_at: [f64; 3],
     /// Largest stretch of the layer; zero where all of it is compressed.
+    #[serde(deserialize_with = "numbers")]
     pub peak_stretch: f64,
 }
 
@@ -340,14 +403,19 @@ pub struct TensionReport {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct ObstacleReport {
     /// How far it has moved towards the surface, along its mean normal.
+    #[serde(deserialize_with = "numbers")]
     pub approach: f64,
     /// How far it has turned, in radians (x, y, z).
+    #[serde(deserialize_with = "numbers")]
     pub tilt: [f64; 3],
     /// The force with which it presses along the mean normal.
+    #[serde(deserialize_with = "numbers")]
     pub force: f64,
     /// The moment about `at` that it needs beside this force (x, y, z).
+    #[serde(deserialize_with = "numbers")]
     pub moment: [f64; 3],
     /// The point about which it turns (x, y, z).
+    #[serde(deserialize_with = "numbers")]
     pub at: [f64; 3],
 }
 
@@ -367,42 +435,9 @@ pub struct StepReport {
     /// Relative residual at the end of the step.
     pub residual: Option<f64>,
     /// Pairs in the order of the scene.
-    pub pairs: Vec<StepPairReport>,
+    pub pairs: Vec<PairResult>,
     /// Forces of supports, springs and rigid surfaces, body by body.
     pub reactions: Vec<ReactionReport>,
-}
-
-/// The result of a pair of surfaces at the end of a load step.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct StepPairReport {
-    /// Contact force on the side that stands first in the scene (x, y, z).
-    pub force: [f64; 3],
-    /// Approach of the two bodies; none where normals cancel.
-    pub approach: Option<f64>,
-    /// Size of the contact.
-    #[serde(flatten)]
-    pub extent: Extent,
-    /// Sum of the pressures times their areas.
-    #[serde(default)]
-    pub normal_force: f64,
-    /// Mean pressure of the part in contact.
-    #[serde(default)]
-    pub mean_pressure: f64,
-    /// The largest tension, if the pair is bonded.
-    #[serde(flatten)]
-    pub tension: Option<TensionReport>,
-    /// Largest pressure; zero where a bond only pulls.
-    pub peak_pressure: f64,
-    /// Largest compression of the layer; negative where all of it is open.
-    pub peak_compression: f64,
-    /// Number of points with c > 0.
-    pub closed: usize,
-    /// The obstacle before the surface, if there is one.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub obstacle: Option<ObstacleReport>,
-    /// Closing of the gap that was found for the force or preload of the pair, or that the step keeps.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub offset: Option<f64>,
 }
 
 /// The part of the common surface of a pair that is in contact, c > 0, and the part that is open, c < 0. They are
@@ -451,16 +486,63 @@ pub struct ReactionReport {
     pub force: [f64; 3],
 }
 
+impl Report {
+    /// Return the results of all pairs.
+    pub fn results(&self) -> impl Iterator<Item = &PairResult> {
+        self.pairs.iter().map(|pair| &pair.result)
+    }
+}
+
+/// Numbers of a report. JSON has null for those that are not finite.
+trait Numbers {
+    /// What JSON has.
+    type Json: DeserializeOwned;
+
+    /// Return the numbers, NaN for null.
+    fn known(json: Self::Json) -> Self;
+}
+
+impl Numbers for f64 {
+    type Json = Option<f64>;
+
+    fn known(json: Option<f64>) -> f64 {
+        json.unwrap_or(f64::NAN)
+    }
+}
+
+impl<T: Numbers, const N: usize> Numbers for [T; N]
+where
+    [T::Json; N]: DeserializeOwned,
+{
+    type Json = [T::Json; N];
+
+    fn known(json: Self::Json) -> Self {
+        json.map(T::known)
+    }
+}
+
+impl<T: Numbers> Numbers for Vec<T> {
+    type Json = Vec<T::Json>;
+
+    fn known(json: Self::Json) -> Self {
+        json.into_iter().map(T::known).collect()
+    }
+}
+
+/// Read numbers that may be null.
+fn numbers<'de, D: Deserializer<'de>, T: Numbers>(json: D) -> Result<T, D::Error> {
+    T::Json::deserialize(json).map(T::known)
+}
+
 /// Most bodies, pairs, load steps or warnings that the terminal lists, as many as a person looks through; the report
 /// has all. Unless the scene gives a number, as many pairs have files of their own.
 pub const LISTED: usize = 24;
 
 /// Return the indices of the `most` pairs with the largest forces, in the order of the scene. Among equal forces the
 /// first is preferred; a force that is not finite counts as zero.
-pub fn busiest(pairs: &[PairReport], most: usize) -> Vec<usize> {
-    let squared = |pair: &PairReport| pair.force[0].iter().map(|f| f * f).sum();
-    let sizes: Vec<f64> =
-        pairs.iter().map(squared).map(|size: f64| if size.is_finite() { size } else { 0.0 }).collect();
+pub fn busiest<'p>(pairs: impl Iterator<Item = &'p PairResult>, most: usize) -> Vec<usize> {
+    let squared = |pair: &PairResult| pair.force[0].iter().map(|f| f * f).sum();
+    let sizes: Vec<f64> = pairs.map(squared).map(|size: f64| if size.is_finite() { size } else { 0.0 }).collect();
     let mut order: Vec<usize> = (0..sizes.len()).collect();
     order.sort_by(|&i, &j| sizes[j].total_cmp(&sizes[i]));
     order.truncate(most);
@@ -474,9 +556,9 @@ mod tests {
 
     #[test]
     fn the_largest_keep_their_order() {
-        let pair = |force: f64| PairReport { force: [[0.0, force, 0.0], [0.0; 3]], ..PairReport::default() };
+        let pair = |force: f64| PairResult { force: [[0.0, force, 0.0], [0.0; 3]], ..PairResult::default() };
         let pairs = [5.0, f64::NAN, -9.0, 5.0].map(pair);
-        let busiest = |most| busiest(&pairs, most);
+        let busiest = |most| busiest(pairs.iter(), most);
         assert_eq!([busiest(1), busiest(2), busiest(9)], [vec![2], vec![0, 2], vec![0, 1, 2, 3]]);
     }
 }

@@ -3,7 +3,7 @@
 
 use super::field;
 use super::folder::{Folder, failed};
-use super::report::{Extent, PairReport, ReactionReport, StepReport, TensionReport};
+use super::report::{PairReport, PairResult, ReactionReport, StepReport, TensionReport};
 use crate::ddm::{Observer, Row};
 use crate::error::Result;
 use std::fs::File;
@@ -24,7 +24,7 @@ fn count(column: impl Into<String>, value: usize) -> Cell {
 }
 
 /// Return the fields `what_x name` and so on of a vector, one per dimension of the scene.
-pub fn vector(what: &str, name: &str, vector: &[f64; 3], dimension: usize) -> impl Iterator<Item = Cell> {
+fn vector(what: &str, name: &str, vector: &[f64; 3], dimension: usize) -> impl Iterator<Item = Cell> {
     ["x", "y", "z"]
         .into_iter()
         .zip(vector)
@@ -156,14 +156,37 @@ pub struct ResultNames {
     pub reactions: Vec<String>,
     /// Dimension of the scene.
     pub dimension: usize,
-    /// What measures the size of contacts: `length` or `area`.
-    pub measure: &'static str,
 }
 
 impl ResultNames {
-    /// Return the field of the size of a contact.
-    pub fn contact(&self, pair: &str, extent: &Extent) -> Cell {
-        number(format!("contact_{} {pair}", self.measure), extent.contact())
+    /// Return the fields of a pair in the table of runs.
+    pub fn of_run(&self, pair: &PairResult, name: &str) -> Vec<Cell> {
+        let mut fields = pressures(pair, name);
+        fields.push(contact(pair, name));
+        fields.push(number(format!("layer_energy {name}"), pair.layer_energy));
+        fields.extend(vector("force", name, &pair.force[0], self.dimension));
+        fields.push(number(format!("approach {name}"), pair.approach));
+        fields.push(number(format!("least_pressure {name}"), pair.least_pressure));
+        fields
+    }
+
+    /// Return the fields of a pair in the table of load steps.
+    fn of_step(&self, pair: &PairResult, name: &str) -> Vec<Cell> {
+        let mut fields: Vec<Cell> = vector("force", name, &pair.force[0], self.dimension).collect();
+        fields.push(number(format!("approach {name}"), pair.approach));
+        fields.push(contact(pair, name));
+        fields.extend(pressures(pair, name));
+        fields.push(count(format!("closed {name}"), pair.closed));
+        if let Some(obstacle) = &pair.obstacle {
+            // about z in the plane
+            let others = if self.dimension == 2 { 2 } else { 0 };
+            for (what, v) in [("tilt", obstacle.tilt), ("moment", obstacle.moment)] {
+                fields.extend(vector(what, name, &v, 3).skip(others));
+            }
+        }
+        fields.extend(pair.offset.map(|offset| number(format!("offset {name}"), offset)));
+        fields.push(number(format!("least_pressure {name}"), pair.least_pressure));
+        fields
     }
 
     /// Return the fields of all reactions.
@@ -173,9 +196,18 @@ impl ResultNames {
     }
 }
 
-/// Return the fields of the largest pressure of a pair and, of a bond, the largest tension with its place.
-pub fn peaks(name: &str, pressure: f64, tension: Option<TensionReport>) -> Vec<Cell> {
-    let mut fields = vec![number(format!("peak_pressure {name}"), pressure)];
+/// Return the field of the size of a contact.
+fn contact(pair: &PairResult, name: &str) -> Cell {
+    let what = if pair.extent.is_area() { "contact_area" } else { "contact_length" };
+    number(format!("{what} {name}"), pair.extent.contact())
+}
+
+/// Return the fields of the pressures of a pair and, of a bond, of the largest tension with its place.
+fn pressures(pair: &PairResult, name: &str) -> Vec<Cell> {
+    let PairResult { normal_force, mean_pressure, peak_pressure, tension, .. } = *pair;
+    let pressures =
+        [("normal_force", normal_force), ("mean_pressure", mean_pressure), ("peak_pressure", peak_pressure)];
+    let mut fields = pressures.map(|(what, value)| number(format!("{what} {name}"), value)).to_vec();
     if let Some(TensionReport { peak_tension, peak_tension_at, .. }) = tension {
         fields.push(number(format!("peak_tension {name}"), peak_tension));
         fields.extend(vector("tension", name, &peak_tension_at, 3));
@@ -187,106 +219,62 @@ impl StepTable {
     /// Write a step.
     pub fn row(&mut self, step: &StepReport) {
         self.count += 1;
-        let dimension = self.names.dimension;
         let mut line = vec![count("step", self.count), number("time", step.time)];
         line.extend(self.factors.iter().map(|name| number(name, step.factors.get(name).copied())));
         line.push(("status".to_owned(), step.status.clone()));
         line.extend([count("iterations", step.iterations), number("residual", step.residual)]);
-        for (pair, name) in step.pairs.iter().zip(&self.names.pairs) {
-            line.extend(vector("force", name, &pair.force, dimension));
-            line.push(number(format!("approach {name}"), pair.approach));
-            line.push(self.names.contact(name, &pair.extent));
-            line.push(number(format!("normal_force {name}"), pair.normal_force));
-            line.push(number(format!("mean_pressure {name}"), pair.mean_pressure));
-            line.extend(peaks(name, pair.peak_pressure, pair.tension));
-            line.push(count(format!("closed {name}"), pair.closed));
-            if let Some(obstacle) = &pair.obstacle {
-                // about z in the plane
-                let others = if dimension == 2 { 2 } else { 0 };
-                for (what, v) in [("tilt", obstacle.tilt), ("moment", obstacle.moment)] {
-                    line.extend(vector(what, name, &v, 3).skip(others));
-                }
-            }
-            line.extend(pair.offset.map(|offset| number(format!("offset {name}"), offset)));
-        }
+        let pairs = step.pairs.iter().zip(&self.names.pairs);
+        line.extend(pairs.flat_map(|(pair, name)| self.names.of_step(pair, name)));
         line.extend(self.names.reactions(&step.reactions));
         self.rows.push(&line);
     }
 }
 
-/// The columns of `contacts.csv` that the report of a pair does not have.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct PairRow {
-    /// Number of points with c > 0.
-    pub closed: usize,
-    /// Initial gap d at the points: least, mean over the area, largest.
-    pub gap: [f64; 3],
-    /// Distance of the surfaces after deformation, -c where that is positive: mean over the area of all points, and
-    /// largest.
-    pub opening: [f64; 2],
-    /// File of its contact table; empty if it has none.
-    pub table: String,
-    /// File of its plot; empty if it has none.
-    pub plot: String,
-}
-
-impl PairRow {
-    /// Return the row of a pair from the area `weight`, the gap d and the compression c of its points, without files.
-    pub fn new(weight: &[f64], gap: &[f64], compression: &[f64]) -> Self {
-        let opening: Vec<f64> = compression.iter().map(|c| (-c).max(0.0)).collect();
-        let total: f64 = weight.iter().sum();
-        let mean = |values: &[f64]| weight.iter().zip(values).map(|(w, v)| w * v).sum::<f64>() / total;
-        let least = gap.iter().copied().fold(f64::INFINITY, f64::min);
-        let most = gap.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        Self {
-            closed: compression.iter().filter(|&&c| c > 0.0).count(),
-            gap: [least, mean(gap), most],
-            opening: [mean(&opening), opening.iter().copied().fold(0.0, f64::max)],
-            ..Self::default()
-        }
-    }
-}
-
 /// Return the fields of a pair in `contacts.csv`.
-fn pair_fields(pair: &PairReport, row: &PairRow) -> Vec<Cell> {
+fn pair_fields(pair: &PairReport) -> Vec<Cell> {
     let text = |column: &str, text: &str| (column.to_owned(), text.to_owned());
+    let file = |column: &str, file: &Option<String>| text(column, file.as_deref().unwrap_or_default());
     let three = |columns: [&str; 3], values: [f64; 3]| [0, 1, 2].map(|k| number(columns[k], values[k]));
+    let PairReport { result, estimate, .. } = pair;
     // others than obstacles do not turn
     let (tilt, moment) =
-        pair.obstacle.as_ref().map_or(([f64::NAN; 3], [f64::NAN; 3]), |found| (found.tilt, found.moment));
+        result.obstacle.as_ref().map_or(([f64::NAN; 3], [f64::NAN; 3]), |found| (found.tilt, found.moment));
     let mut fields = vec![
         text("a", &pair.bodies[0]),
         text("b", &pair.bodies[1]),
         text("surface_a", &pair.surfaces[0]),
         text("surface_b", &pair.surfaces[1]),
         count("points", pair.points),
-        count("closed", row.closed),
+        count("closed", result.closed),
     ];
-    fields.extend(three(["force_x", "force_y", "force_z"], pair.force[0]));
-    fields.extend([number("normal_force", pair.normal_force), number("mean_pressure", pair.mean_pressure)]);
-    fields.push(number("peak_pressure", pair.peak_pressure));
-    fields.extend(three(["peak_x", "peak_y", "peak_z"], pair.peak_at));
-    fields.push(number("peak_tension", pair.tension.map(|tension| tension.peak_tension)));
-    let pulled_at = pair.tension.map_or([f64::NAN; 3], |tension| tension.peak_tension_at);
+    fields.extend(three(["force_x", "force_y", "force_z"], result.force[0]));
+    fields.extend([number("normal_force", result.normal_force), number("mean_pressure", result.mean_pressure)]);
+    fields.push(number("peak_pressure", result.peak_pressure));
+    fields.extend(three(["peak_x", "peak_y", "peak_z"], result.peak_at));
+    fields.push(number("peak_tension", result.tension.map(|tension| tension.peak_tension)));
+    let pulled_at = result.tension.map_or([f64::NAN; 3], |tension| tension.peak_tension_at);
     fields.extend(three(["tension_x", "tension_y", "tension_z"], pulled_at));
-    fields.extend([number("contact", pair.extent.contact()), number("open", pair.extent.open())]);
-    fields.extend(three(["gap_least", "gap_mean", "gap_largest"], row.gap));
-    fields.extend([number("opening_mean", row.opening[0]), number("opening_largest", row.opening[1])]);
-    fields.extend([number("energy", pair.layer_energy), number("approach", pair.approach)]);
+    fields.extend([number("contact", result.extent.contact()), number("open", result.extent.open())]);
+    fields.extend(three(["gap_least", "gap_mean", "gap_largest"], result.gap));
+    fields.extend([number("opening_mean", result.opening[0]), number("opening_largest", result.opening[1])]);
+    fields.extend([number("energy", result.layer_energy), number("approach", result.approach)]);
     fields.extend(three(["tilt_x", "tilt_y", "tilt_z"], tilt));
     fields.extend(three(["moment_x", "moment_y", "moment_z"], moment));
-    fields.extend([number("offset", pair.offset), text("table", &row.table), text("plot", &row.plot)]);
+    fields.extend([number("offset", result.offset), file("table", &pair.table), file("plot", &pair.plot)]);
+    fields.push(number("least_pressure", result.least_pressure));
+    fields.push(number("pressure_estimate", estimate.map(|errors| errors.pressure_estimate)));
+    fields.push(number("force_estimate", estimate.map(|errors| errors.force_estimate)));
     fields
 }
 
 /// Write the pairs to `contacts.csv`, in the order of the scene.
-pub fn save(folder: &Folder, pairs: &[PairReport], rows: &[PairRow]) -> Result<()> {
-    let header = pair_fields(&PairReport::default(), &PairRow::default());
+pub fn save(folder: &Folder, pairs: &[PairReport]) -> Result<()> {
+    let header = pair_fields(&PairReport::default());
     folder.write("contacts.csv", |out| {
         let mut csv = csv::Writer::from_writer(out);
         csv.write_record(header.iter().map(|(column, _)| column))?;
-        for (pair, row) in pairs.iter().zip(rows) {
-            csv.write_record(pair_fields(pair, row).iter().map(|(_, text)| text))?;
+        for pair in pairs {
+            csv.write_record(pair_fields(pair).iter().map(|(_, text)| text))?;
         }
         csv.flush()
     })
@@ -348,7 +336,7 @@ impl ContactTable {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::output::{Extent, ObstacleReport};
+    use crate::output::{Extent, ObstacleReport, PairEstimate};
 
     #[test]
     fn rows_are_in_the_file_before_the_end() {
@@ -369,20 +357,19 @@ mod tests {
     }
 
     #[test]
-    fn a_row_has_means_by_weight_and_stands_under_its_columns() {
-        let row = PairRow::new(&[1.0, 3.0], &[0.25, -0.75], &[-2.0, 0.5]);
-        assert_eq!((row.closed, row.gap, row.opening), (1, [-0.75, -0.5, 0.25], [0.5, 2.0]));
-        let pair = PairReport {
-            bodies: ["up", "low"].map(str::to_owned),
-            surfaces: ["up_bottom", "low_top"].map(str::to_owned),
-            points: 2,
+    fn a_row_stands_under_its_columns() {
+        let result = PairResult {
+            closed: 1,
             force: [[1.0, 2.0, 3.0], [-1.0, -2.0, -3.0]],
             normal_force: 3.5,
+            least_pressure: 0.25,
             mean_pressure: 0.5,
             peak_pressure: 4.0,
             peak_at: [5.0, 6.0, 7.0],
             tension: Some(TensionReport { peak_tension: 7.5, peak_tension_at: [0.0, 1.0, 2.0], peak_stretch: 0.1 }),
             extent: Extent::Area { contact_area: 8.0, open_area: 9.0 },
+            gap: [-0.75, -0.5, 0.25],
+            opening: [0.5, 2.0],
             layer_energy: 10.0,
             approach: Some(11.0),
             obstacle: Some(ObstacleReport {
@@ -390,17 +377,25 @@ mod tests {
                 moment: [4.0, 5.0, 6.0],
                 ..ObstacleReport::default()
             }),
+            ..PairResult::default()
+        };
+        let pair = PairReport {
+            bodies: ["up", "low"].map(str::to_owned),
+            surfaces: ["up_bottom", "low_top"].map(str::to_owned),
+            points: 2,
+            result,
+            estimate: Some(PairEstimate { pressure_estimate: 0.125, force_estimate: 1e-3 }),
+            table: Some("contact-up-low.csv".into()),
             ..PairReport::default()
         };
-        let row = PairRow { table: "contact-up-low.csv".into(), ..row };
         let base = tempfile::tempdir().unwrap();
-        save(&Folder::create(base.path()).unwrap(), &[pair], &[row]).unwrap();
+        save(&Folder::create(base.path()).unwrap(), &[pair]).unwrap();
         let text = std::fs::read_to_string(base.path().join("contacts.csv")).unwrap();
         let (header, line) = text.trim().split_once('\n').unwrap();
-        assert_eq!(header.split(',').count(), 37);
+        assert_eq!(header.split(',').count(), 40);
         assert_eq!(
             line,
-            "up,low,up_bottom,low_top,2,1,1.0,2.0,3.0,3.5,0.5,4.0,5.0,6.0,7.0,7.5,0.0,1.0,2.0,8.0,9.0,-0.75,-0.5,0.25,0.5,2.0,10.0,11.0,0.1,0.2,0.3,4.0,5.0,6.0,,contact-up-low.csv,"
+            "up,low,up_bottom,low_top,2,1,1.0,2.0,3.0,3.5,0.5,4.0,5.0,6.0,7.0,7.5,0.0,1.0,2.0,8.0,9.0,-0.75,-0.5,0.25,0.5,2.0,10.0,11.0,0.1,0.2,0.3,4.0,5.0,6.0,,contact-up-low.csv,,0.25,0.125,0.001"
         );
     }
 }

@@ -2,7 +2,7 @@
 
 use super::stages::{All, Built, Clock, Done};
 use super::verdict::{self, message, status_name};
-use super::{extent, results, warnings};
+use super::{results, warnings};
 use crate::ddm::{Outcome, Row, Status};
 use crate::discretize::{BodyInfo, Discrete};
 use crate::error::Result;
@@ -12,7 +12,7 @@ use crate::exchange::{all_gather, gather};
 use crate::linalg::axpy;
 use crate::model::{Body, BodyCounts, Model};
 use crate::output::{
-    BodyReport, ContactTable, EstimateReport, FieldArray, InnerTimes, IntervalReport, PairReport, Report,
+    BodyReport, ContactTable, EstimateReport, FieldArray, InnerTimes, IntervalReport, PairEstimate, PairReport, Report,
     UnstructuredGrid,
 };
 use crate::petsc::Session;
@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
 /// Return the report of a run. Collective.
-pub fn report(session: &Session, done: &Done, recovered: &All, clock: &Clock) -> Report {
+pub fn report(session: &Session, done: &Done, recovered: &All, estimate: Option<&Estimate>, clock: &Clock) -> Report {
     let (discrete, model, outcome) = (&done.built.discrete, done.model(), &done.outcome);
     let shared = GatheredCounters::gather(discrete);
     let mut report = headline(session, &done.built, &shared.solvers, clock);
@@ -42,7 +42,9 @@ pub fn report(session: &Session, done: &Done, recovered: &All, clock: &Clock) ->
     }
     report.warnings.extend(warnings::nothing_touches(done));
     let approaches = results::approaches(done, recovered);
-    report.pairs = approaches.into_iter().enumerate().map(|(i, approach)| pair_report(done, i, approach)).collect();
+    let of_pair = |(i, approach)| pair_report(done, i, approach, estimate);
+    report.pairs = approaches.into_iter().enumerate().map(of_pair).collect();
+    report.discretization_error = estimate.map(discretization_error);
     let balances = results::balances(done, recovered);
     let digits = report.error_bound.or(report.error_estimate).unwrap_or(f64::INFINITY);
     for (body, (info, balance)) in discrete.bodies.iter().zip(&balances).enumerate() {
@@ -216,7 +218,7 @@ impl GatheredCounters {
 }
 
 /// Return the estimate of the discretisation error for the report.
-pub fn discretization_error(estimate: &Estimate) -> EstimateReport {
+fn discretization_error(estimate: &Estimate) -> EstimateReport {
     let total: f64 = estimate.bodies.iter().chain(&estimate.layers).sum();
     let fraction = |error: &f64| if total > 0.0 { error / total } else { 0.0 };
     EstimateReport {
@@ -229,36 +231,25 @@ pub fn discretization_error(estimate: &Estimate) -> EstimateReport {
     }
 }
 
-fn pair_report(done: &Done, i: usize, approach: Option<f64>) -> PairReport {
-    let (discrete, model, layer) = (&done.built.discrete, done.model(), &done.outcome.layer);
-    let (pair, range) = (&model.pairs[i], model.range(i));
-    let (c, p, force) = (&layer.compression[range.clone()], &layer.pressure[range.clone()], &layer.force[range]);
-    let sides = discrete.sides(i);
-    let (peak, peak_pressure) = results::largest_pressure(p);
-    let (extent, contact_ends) = extent::of(done, i);
+fn pair_report(done: &Done, i: usize, approach: Option<f64>, estimate: Option<&Estimate>) -> PairReport {
+    let (discrete, model) = (&done.built.discrete, done.model());
+    let pair = &model.pairs[i];
     PairReport {
         surfaces: discrete.specs[i].between.each_ref().map(|name| name.value.clone()),
-        bodies: sides.map(|side| model.bodies[pair.bodies[side]].name.clone()),
+        bodies: discrete.sides(i).map(|side| model.bodies[pair.bodies[side]].name.clone()),
         contact: discrete.specs[i].table,
         points: pair.len(),
         carrier: pair.surfaces[0].clone(),
         facets_uncovered: pair.uncovered(),
         pieces_lost: pair.pieces_lost(),
         facets_averaged: pair.averaged(),
-        layer_energy: layer.energy[i],
-        force: sides.map(|side| results::resultant(force, &pair.resultant[side])),
-        moment: sides.map(|side| results::resultant(force, &pair.moment[side])),
-        approach,
-        normal_force: force.iter().sum(),
-        mean_pressure: results::mean_pressure(force, &extent),
-        peak_pressure,
-        peak_at: pair.position[peak],
-        peak_compression: results::peak(c),
-        tension: results::tension(pair, c, p),
-        extent,
-        contact_ends,
-        obstacle: results::obstacle(done, i),
-        offset: results::offset(done, i),
+        result: results::pair(done, i, approach),
+        estimate: estimate.map(|estimate| PairEstimate {
+            pressure_estimate: estimate.pressure[i],
+            force_estimate: estimate.force[i],
+        }),
+        table: None,
+        plot: None,
     }
 }
 

@@ -9,12 +9,12 @@ use crate::error::{Result, few};
 use crate::exchange::all_gather;
 use crate::fem::displacement::{self, Strained};
 use crate::fem::{length, minus};
-use crate::linalg::{around, bounds};
+use crate::linalg::{around, bounds, dot, range as range_of};
 use crate::model::{Body, BodySlot, Field};
 use crate::output::closing::readable;
 use crate::output::{
-    BalanceReport, BodyReport, Extent, ForceReport, LargestStress, ObstacleReport, ReactionReport, ResultNames,
-    StepPairReport, StepReport, TensionReport, sci,
+    BalanceReport, BodyReport, Extent, ForceReport, LargestStress, ObstacleReport, PairResult, ReactionReport,
+    ResultNames, StepReport, TensionReport, sci,
 };
 use crate::problem::history::History;
 use serde::{Deserialize, Serialize};
@@ -220,12 +220,7 @@ pub fn names_of_results(built: &Built) -> ResultNames {
         let all = body.supports.iter().chain(&body.springs).chain(&body.rigid);
         all.map(|on| format!("{}:{on}", body.name))
     });
-    ResultNames {
-        pairs: pair_names(built),
-        reactions: numbered(reactions),
-        dimension: built.scene.dimension.value,
-        measure: built.discrete.model.pairs.first().map_or("length", |pair| pair.measure.name()),
-    }
+    ResultNames { pairs: pair_names(built), reactions: numbered(reactions), dimension: built.scene.dimension.value }
 }
 
 /// Return the reactions of bodies with these names and balances, in the order of [`names_of_results`].
@@ -271,29 +266,29 @@ pub fn step(
 
 /// Return the resultant force or moment of contact forces (n) on a side: minus the sum of the forces times the `rows`
 /// (n x 3) of their points.
-pub fn resultant(force: &[f64], rows: &[[f64; 3]]) -> [f64; 3] {
+fn resultant(force: &[f64], rows: &[[f64; 3]]) -> [f64; 3] {
     std::array::from_fn(|k| force.iter().zip(rows).fold(0.0, |sum, (force, row)| sum - force * row[k]))
 }
 
 /// Return the largest compression of a layer, negative if all of it is open.
-pub fn peak(compression: &[f64]) -> f64 {
+fn largest(compression: &[f64]) -> f64 {
     compression.iter().copied().fold(f64::NEG_INFINITY, f64::max)
 }
 
 /// Return the point of the largest pressure, and this pressure. It is zero where a bond only pulls.
-pub fn largest_pressure(pressure: &[f64]) -> (usize, f64) {
+fn largest_pressure(pressure: &[f64]) -> (usize, f64) {
     let peak = (0..pressure.len()).max_by(|&q, &r| pressure[q].total_cmp(&pressure[r])).unwrap_or(0);
     (peak, if pressure[peak] < 0.0 { 0.0 } else { pressure[peak] })
 }
 
 /// Return the mean pressure of the part in contact, from the forces of the points; zero without contact.
-pub fn mean_pressure(force: &[f64], extent: &Extent) -> f64 {
+fn mean_pressure(force: &[f64], extent: &Extent) -> f64 {
     let pressed = force.iter().fold(0.0, |sum, force| sum + force.max(0.0));
     if extent.contact() > 0.0 { pressed / extent.contact() } else { 0.0 }
 }
 
 /// Return the largest tension of a bonded pair and the largest stretch of its layer; none without a bond.
-pub fn tension(pair: &ContactPair, compression: &[f64], pressure: &[f64]) -> Option<TensionReport> {
+fn tension(pair: &ContactPair, compression: &[f64], pressure: &[f64]) -> Option<TensionReport> {
     let least =
         (0..pair.len()).min_by(|&q, &r| pressure[q].total_cmp(&pressure[r])).filter(|_| pair.law.is_bonded())?;
     Some(TensionReport {
@@ -303,25 +298,42 @@ pub fn tension(pair: &ContactPair, compression: &[f64], pressure: &[f64]) -> Opt
     })
 }
 
-/// Return the report of pair `i` in a load step.
-pub fn pair(done: &Done, i: usize, approach: Option<f64>) -> StepPairReport {
-    let (discrete, model, layer) = (&done.built.discrete, done.model(), &done.outcome.layer);
+/// Return the result of pair `i`.
+pub fn pair(done: &Done, i: usize, approach: Option<f64>) -> PairResult {
+    let (model, layer) = (done.model(), &done.outcome.layer);
     let (pair, range) = (&model.pairs[i], model.range(i));
     let (c, p, force) = (&layer.compression[range.clone()], &layer.pressure[range.clone()], &layer.force[range]);
-    let extent = extent::of(done, i).0;
-    StepPairReport {
-        force: resultant(force, &pair.resultant[discrete.sides(i)[0]]),
+    let sides = done.built.discrete.sides(i);
+    let (extent, contact_ends) = extent::of(done, i);
+    let (peak, peak_pressure) = largest_pressure(p);
+    let closed = || (0..pair.len()).filter(|&q| c[q] > pair.law.rest(q));
+    let opening: Vec<f64> = c.iter().map(|c| (-c).max(0.0)).collect();
+    let [least_gap, largest_gap] = range_of(pair.gap.iter().copied());
+    PairResult {
+        closed: closed().count(),
+        force: sides.map(|side| resultant(force, &pair.resultant[side])),
+        moment: sides.map(|side| resultant(force, &pair.moment[side])),
         approach,
-        extent,
         normal_force: force.iter().sum(),
+        least_pressure: closed().map(|q| p[q]).reduce(f64::min).unwrap_or(0.0),
         mean_pressure: mean_pressure(force, &extent),
+        peak_pressure,
+        peak_at: pair.position[peak],
+        peak_compression: largest(c),
         tension: tension(pair, c, p),
-        peak_pressure: largest_pressure(p).1,
-        peak_compression: peak(c),
-        closed: c.iter().enumerate().filter(|(point, c)| **c > pair.law.rest(*point)).count(),
+        extent,
+        contact_ends,
+        gap: [least_gap, mean(&pair.area, &pair.gap), largest_gap],
+        opening: [mean(&pair.area, &opening), opening.iter().copied().fold(0.0, f64::max)],
+        layer_energy: layer.energy[i],
         obstacle: obstacle(done, i),
         offset: offset(done, i),
     }
+}
+
+/// Return the mean of values with these weights.
+fn mean(weight: &[f64], values: &[f64]) -> f64 {
+    dot(weight, values) / weight.iter().sum::<f64>()
 }
 
 /// Return the motion of the obstacle of pair `i` and what acts on it; none without an obstacle.

@@ -12,7 +12,7 @@ use crate::fem::{length, minus};
 use crate::linalg;
 use crate::model::Mechanism;
 use crate::output::closing::{DIGITS, place, readable};
-use crate::output::{BalanceReport, StepPairReport, sci};
+use crate::output::{BalanceReport, PairResult, sci};
 use crate::petsc::Session;
 use crate::problem::ContactSpec;
 use crate::scene::Scene;
@@ -65,15 +65,24 @@ pub fn made_straight(cells: usize) -> Option<String> {
 fn of_mechanisms(discrete: &Discrete) -> Vec<String> {
     let mut found: Vec<(Mechanism, Vec<usize>)> = Vec::new();
     for mechanism in &discrete.mechanisms {
-        let mut kind = mechanism.clone();
-        let bodies = std::mem::take(&mut kind.bodies);
-        kind.fixed = kind.fixed.map(|body| if bodies.len() == 1 { 0 } else { body });
-        match found.iter_mut().find(|(other, _)| bodies.len() == 1 && kind == *other) {
-            Some((_, alike)) => alike.extend(bodies),
-            None => found.push((if bodies.len() == 1 { kind } else { mechanism.clone() }, bodies)),
+        let (mut kind, bodies) = (mechanism.clone(), mechanism.bodies.clone());
+        if let [body] = bodies[..] {
+            kind.bodies.clear();
+            if let Some((other, alike)) = found.iter_mut().find(|(other, _)| is_alike(other, &kind)) {
+                other.balanced = other.balanced.max(kind.balanced);
+                alike.push(body);
+                continue;
+            }
         }
+        found.push((kind, bodies));
     }
     found.iter().map(|(mechanism, bodies)| mechanism_in_words(discrete, mechanism, bodies)).collect()
+}
+
+/// Return whether two motions of one body each have the same words, but for how much balance their loads lack.
+fn is_alike(a: &Mechanism, b: &Mechanism) -> bool {
+    let words = |m: &Mechanism| (m.bodies.is_empty(), m.work != 0.0, m.balanced > 0.0, m.fixed.is_some());
+    a.motion == b.motion && words(a) == words(b)
 }
 
 /// Return the warning of a motion that nothing resists. It is one of these bodies together if it names them, and one
@@ -89,7 +98,8 @@ fn mechanism_in_words(discrete: &Discrete, mechanism: &Mechanism, bodies: &[usiz
     };
     let loads = match *work {
         0.0 if *balanced > 0.0 => format!(
-            "the loads lack balance there by {} of what forces of their sizes could do: they were changed by that share to balance",
+            "the loads lack balance there by {}{} of what forces of their sizes could do: they were changed by that share to balance",
+            if bodies.len() > 1 && mechanism.bodies.is_empty() { "up to " } else { "" },
             sci(*balanced, 1)
         ),
         0.0 => "no load works on it".to_owned(),
@@ -156,8 +166,10 @@ fn of_surfaces(discrete: &Discrete) -> Vec<String> {
     let mut warnings = Vec::new();
     for (i, (pair, spec)) in discrete.model.pairs.iter().zip(&discrete.specs).enumerate() {
         warnings.extend(lost(discrete, i));
-        let overlap = pair.gap.iter().copied().fold(0.0, f64::min);
-        // the gap of an obstacle says how far it reaches into the body
+        // who types a negative gap, as for a fit, knows that bodies overlap there; that of an obstacle says how far it
+        // reaches into the body
+        let drawn = pair.gap.iter().zip(&pair.position).filter(|(_, x)| spec.gap.eval(**x) >= 0.0);
+        let overlap = drawn.map(|(gap, _)| *gap).fold(0.0, f64::min);
         if overlap < 0.0 && !spec.obstacle {
             let [a, b] = names(spec);
             warnings.push(format!(
@@ -366,8 +378,8 @@ fn most_stretched(done: &Done, i: usize) -> Option<Largest> {
 
 /// Return the largest of what `of` takes from the reports of a pair over all solutions of a run: a compression and a
 /// pressure.
-fn largest(done: &Done, i: usize, of: fn(&StepPairReport) -> Option<[f64; 2]>) -> Option<Largest> {
-    let found = |pair: &StepPairReport, step| of(pair).map(|[most, pressure]| Largest { most, pressure, step });
+fn largest(done: &Done, i: usize, of: fn(&PairResult) -> Option<[f64; 2]>) -> Option<Largest> {
+    let found = |pair: &PairResult, step| of(pair).map(|[most, pressure]| Largest { most, pressure, step });
     if done.steps.is_empty() {
         let is_solved = done.outcome.status.is_solved();
         return is_solved.then(|| results::pair(done, i, None)).and_then(|pair| found(&pair, None));

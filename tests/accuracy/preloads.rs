@@ -49,7 +49,7 @@ fn a_bolt_keeps_its_preload() {
         let table = case("bolt").with_file_name("tighten.csv").display().to_string();
         let run = solve_here(case("bolt"), &[&format!("method={{{method},steps={{table='{table}'}}}}")]).converged();
         for (step, &service) in service.iter().enumerate() {
-            let force = run.number(&format!("steps/{step}/pairs/0/force/1"));
+            let force = run.number(&format!("steps/{step}/pairs/0/force/0/1"));
             close(&format!("{method} step {step}"), force.abs(), expected(service), 1e-4);
         }
         let offset = |step: usize| run.number(&format!("steps/{step}/pairs/0/offset"));
@@ -57,7 +57,7 @@ fn a_bolt_keeps_its_preload() {
         assert!((1..5).all(|step| offset(step) == offset(0)), "{method}");
     }
     let run = solve_on(3, case("bolt"), &["--set", "solver=mumps"]).converged();
-    close("ranks", run.number("steps/3/pairs/0/force/1").abs(), expected(360.0), 1e-4);
+    close("ranks", run.number("steps/3/pairs/0/force/0/1").abs(), expected(360.0), 1e-4);
     assert_eq!(run.number("steps/3/pairs/0/offset"), run.number("steps/0/pairs/0/offset"));
 }
 
@@ -68,7 +68,7 @@ fn tightened_in_steps() {
     let table = scene.path.with_file_name("turn.csv");
     std::fs::write(&table, "turn, service\n0.5, 0\n0.5, 20\n1, 20\n1, 0\n").expect("a table");
     let run = solve_here(&scene.path, &[&format!("method.steps={{table='{}'}}", table.display())]).converged();
-    let forces: Vec<f64> = (0..4).map(|step| run.number(&format!("steps/{step}/pairs/0/force/1")).abs()).collect();
+    let forces: Vec<f64> = (0..4).map(|step| run.number(&format!("steps/{step}/pairs/0/force/0/1")).abs()).collect();
     let offsets: Vec<f64> = (0..4).map(|step| run.number(&format!("steps/{step}/pairs/0/offset"))).collect();
     close("half", forces[0], 50.0, 1e-6);
     assert!(forces[1] > 60.0 && offsets[0] == offsets[1], "{forces:?} {offsets:?}");
@@ -163,7 +163,7 @@ fn a_preload_is_kept_over_a_restart() {
         let folder = ended.folder.display().to_string();
         let rest = solve_on(then, &scene.path, &[&solver[..], &["--restart", &folder]].concat());
         assert_eq!(rest["status"], "converged", "{}", rest.said());
-        for path in ["offset", "force/1"] {
+        for path in ["offset", "force/0/1"] {
             for step in 0..4 {
                 let of = |run: &Run| run.number(&format!("steps/{step}/pairs/0/{path}"));
                 close(path, of(&rest), of(&whole), 1e-9);
@@ -198,7 +198,7 @@ fn a_bolt_between_outer_faces() {
     let (bolt, plates) = (2e4, 2.0 / (2.0 / 1e5 + 1.0 / 1e5));
     let run = solve_here(&scene.path, &[]).converged();
     for (step, service) in [0.0, 40.0, 60.0].into_iter().enumerate() {
-        let force = run.number(&format!("steps/{step}/pairs/0/force/1"));
+        let force = run.number(&format!("steps/{step}/pairs/0/force/0/1"));
         close("force", force.abs(), 100.0 + service * bolt / (bolt + plates), 1e-6);
     }
 }

@@ -381,7 +381,8 @@ fn vertices_between_points_at_mid_edges() {
 fn an_overlap_is_taken_or_refused() {
     let deep = ["--set", "contact.0.gap=-1e-5"];
     let taken = solve(case("patch-3d"), &deep).converged();
-    assert!(taken.warnings().contains("overlap by 1.000e-5"), "{}", taken.warnings());
+    // who types an overlap knows of it
+    assert!(!taken.warnings().contains("overlap"), "{}", taken.warnings());
     // the layer closes by as much as without the overlap
     assert!((taken.contact()["compression"][0] / (2.5e-5 * 10f64.sqrt()) - 1.0).abs() < 1e-9);
     let refused = solve(case("patch-3d"), &[deep[0], deep[1], "--set", "contact.0.overlap=error"]);

@@ -131,7 +131,7 @@ fn solves(session: &Session) {
     assert_eq!((solution.pairs(), solution.report().dofs), (1, 16));
     let table = solution.contact(0);
     assert!(table.pressure.iter().all(|p| (p - 1.0).abs() < 1e-9) && table.gap == [0.01; 2], "{table:?}");
-    let forces = solution.report().pairs[0].force;
+    let forces = solution.report().pairs[0].result.force;
     assert!((forces[0][1] + 1.0).abs() < 1e-9 && (forces[1][1] - 1.0).abs() < 1e-9, "{forces:?}");
     // the gap of 0.01, 0.01 of each body, 0.02 of the layer
     for (body, sunk) in [(0, [0.0, 0.01]), (1, [0.04, 0.05])] {

@@ -1,6 +1,6 @@
 //! The page of a run.
 
-use crate::common::{Scene, case, output, solve};
+use crate::common::{Scene, Table, case, output, solve};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
@@ -24,8 +24,8 @@ fn triangles(part: &Value) -> usize {
     STANDARD.decode(part["triangles"].as_str().expect("base64")).expect("base64").len() / 12
 }
 
-/// Opens a page in Chromium; the page after its scripts have run. None where there is no Chromium.
-fn opened(path: &Path) -> Option<String> {
+/// Opens a page in a window of Chromium of this width; the page after its scripts have run. None where there is no Chromium.
+fn opened(path: &Path, width: usize) -> Option<String> {
     let names = ["chromium", "chromium-browser", "google-chrome"];
     let has = |name: &&str| Command::new("which").arg(name).output().is_ok_and(|found| found.status.success());
     let Some(browser) = names.into_iter().find(has) else {
@@ -42,6 +42,7 @@ fn opened(path: &Path) -> Option<String> {
     ]);
     command.args(["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--enable-logging=stderr"]);
     command.arg(format!("--user-data-dir={}", scratch.path().display()));
+    command.arg(format!("--window-size={width},600"));
     command.args(["--virtual-time-budget=3000", "--dump-dom"]).arg(format!("file://{}", path.display()));
     let (status, dom, log) = output(command, Duration::from_secs(120));
     assert!(status.success(), "{log}");
@@ -76,7 +77,7 @@ fn a_plane_run_has_a_page_of_its_own() {
     for foreign in ["<img", "<link rel=\"style", "<script src", "@import", "url(", "<b>A</b>", "<script>boom"] {
         assert!(!page.contains(foreign), "{foreign}");
     }
-    let error = if run.report["error_bound"].is_null() { "is estimated as" } else { "is at most" };
+    let error = if run.report["error_bound"].is_null() { "estimated error" } else { "error at most" };
     for words in [
         "&lt;b&gt;A&lt;/b&gt; &amp;",
         "von Mises stress, MPa",
@@ -104,7 +105,15 @@ fn a_plane_run_has_a_page_of_its_own() {
     };
     assert_eq!(kinds(&view["bodies"][0]), ["closed", "open", "support"]);
     assert_eq!(kinds(&view["bodies"][1]), ["closed", "load", "open", "support"]);
-    assert!(page.contains("supports: lower_axis, lower_face, upper_axis<") && page.contains("loads: upper_face<"));
+    let legend: Vec<&str> =
+        view["roles"].as_array().expect("roles").iter().filter_map(|role| role[1].as_str()).collect();
+    let surfaces = "lower_top, upper_bottom";
+    assert_eq!(legend[..2], ["supports: lower_axis, lower_face, upper_axis", "loads: upper_face"]);
+    assert_eq!(legend[2..], [format!("closed contact: {surfaces}"), format!("open contact: {surfaces}")]);
+    // the numbers of the contact come first, then the picture, which has no warnings before it
+    let [numbers, picture, more] =
+        ["<td data-of=\"contact\">", "<canvas>", "<h2>Contact</h2>"].map(|words| page.find(words).expect(words));
+    assert!(numbers < picture && picture < more && !page[..picture].contains("class=\"warning\""));
     let lines = |body: usize, kind: usize| {
         let text = view["bodies"][body]["marks"][kind][1][1].as_str().expect("base64");
         STANDARD.decode(text).expect("base64").len() / 8
@@ -112,7 +121,7 @@ fn a_plane_run_has_a_page_of_its_own() {
     // 16 facets on each contact surface of length 4, which is closed up to x = 3.45
     assert_eq!([lines(0, 0), lines(0, 1), lines(1, 0), lines(1, 2)], [14, 2, 14, 2]);
     assert!(run.report["memory"]["iterate"].as_f64().expect("memory") > 1.0);
-    if let Some(dom) = opened(&run.folder.join("report.html")) {
+    if let Some(dom) = opened(&run.folder.join("report.html"), 800) {
         assert!(dom.contains("Run it again"));
         // the script has drawn
         assert!(dom.contains("<output>× ") && dom.contains("<span style=\"background"), "the view is not drawn");
@@ -140,17 +149,67 @@ fn the_mouse_reads_values() {
     }, 100)</script></body>";
     let path = run.folder.join("pointed.html");
     fs::write(&path, html.replacen("<head>", frames, 1).replacen("</body>", pointing, 1)).expect("a page");
-    if let Some(dom) = opened(&path) {
+    if let Some(dom) = opened(&path, 800) {
         let under = dom.split("class=\"under\">").nth(1).and_then(|rest| rest.split('<').next()).expect("a line");
         // the middle of the upper block lies a quarter below the upper end of the picture
         assert!(under.starts_with("upper at (2") && under.ends_with(" (von Mises stress)"), "{under}");
         let bar = dom.split("class=\"bar\">").nth(1).and_then(|rest| rest.split("</div>").next()).expect("a bar");
         assert!(
-            bar.contains(">5</span>") && bar.ends_with("to 11"),
+            bar.contains(">5</span>") && bar.contains(">to 11</span>"),
             "colours begin and end with what was typed: {bar}"
         );
         let axes = dom.split("class=\"axes\"").nth(1).and_then(|rest| rest.split("</svg>").next()).expect("axes");
         assert!(axes.contains(">x</text>") && axes.contains(">y</text>") && !axes.contains(">z</text>"), "{axes}");
+    }
+}
+
+/// Places where something acts are drawn if they are chosen, with their own legend, and the picture can be saved. Warnings are folded. Load steps have their
+/// forces in a table, and their contact points in files.
+#[test]
+fn a_page_of_load_steps() {
+    let run = solve(case("bolt"), &["--report", "--estimate"]).converged();
+    let html = page(&run.folder);
+    let warnings = html.find("<details><summary>3 warnings</summary>").expect("folded warnings");
+    assert!(html.find("<canvas>").is_some_and(|picture| picture < warnings) && html.contains("<h2>Load steps</h2>"));
+    let count = run.report["steps"].as_array().expect("steps").len();
+    for step in 0..count {
+        let force = run.number(&format!("steps/{step}/pairs/0/normal_force"));
+        let cell = format!("{force:.2}").trim_end_matches('0').trim_end_matches('.').replace('-', "−");
+        let row = format!("<td data-of=\"of\">top1 – cut</td><td class=\"n\" data-of=\"step\">{}</td>", step + 1);
+        let line = html.lines().find(|line| line.contains(&row)).expect("a row of the step");
+        assert!(line.contains(&format!("<td class=\"n\" data-of=\"normal force\">{cell}</td>")), "{cell}: {line}");
+        if step + 1 < count {
+            let points = Table::read(&run.folder.join(format!("steps/contact-column1-head-{}.csv", step + 1)));
+            let sum: f64 = (0..points.rows()).map(|q| points["weight"][q] * points["pressure"][q]).sum();
+            assert!((sum - force).abs() < 1e-9 * force.abs(), "step {step}: {sum} {force}");
+        }
+    }
+    for pair in 0..3 {
+        let [own, listed] =
+            [format!("pairs/{pair}/pressure_estimate"), format!("discretization_error/pressure/{pair}")];
+        assert_eq!(run.number(&own), run.number(&listed));
+    }
+    let choosing = "<script>setTimeout(() => {
+        const what = document.querySelector('select');
+        what.value = 'places';
+        what.dispatchEvent(new Event('change'));
+        HTMLAnchorElement.prototype.click = function() { document.title = this.download + ' ' + this.href.slice(0, 22); };
+        [...document.querySelectorAll('#bodies button')].find(button => button.textContent.startsWith('Save')).click();
+        const fits = [...document.querySelectorAll('.wide')].every(table => table.scrollWidth <= table.clientWidth);
+        document.title += fits ? ' fits' : ' is too wide';
+    }, 100)</script></body>";
+    let path = run.folder.join("chosen.html");
+    fs::write(&path, html.replacen("</body>", choosing, 1)).expect("a page");
+    // as narrow as a window of Chromium can be
+    if let Some(dom) = opened(&path, 500) {
+        let bar =
+            dom.split("class=\"bar roles\">").nth(1).and_then(|rest| rest.split("</div>").next()).expect("a legend");
+        assert!(bar.contains(">supports: base0, base1, base2, pin, ") && bar.contains(">loads: crown<"), "{bar}");
+        assert!(
+            dom.contains("<title>A bolt with preload.png data:image/png;base64, fits</title>"),
+            "{:?}",
+            dom.split("title>").nth(1)
+        );
     }
 }
 
@@ -170,7 +229,7 @@ fn bodies_in_space_are_their_surfaces() {
         let [low, high] = [0, 1].map(|end| view["pressure"][end].as_f64().expect("a number"));
         assert!(low == 0.0 && (high - 10.0).abs() < 1e-6, "{}", view["pressure"]);
         if order == 2
-            && let Some(dom) = opened(&run.folder.join("report.html"))
+            && let Some(dom) = opened(&run.folder.join("report.html"), 800)
         {
             // the script has drawn: the magnification stands beside the slider
             assert!(dom.contains("<output>× "), "the view is not drawn");

@@ -7,7 +7,7 @@ use std::path::Path;
 
 /// The modules from the ground up; each may use those below it.
 const MODULES: &str = "petsc error exchange file interrupt linalg data expression problem mesh fem contact parallel \
-    solver model robin ddm output report scene discretize estimate run api commands internals cli main";
+    solver model robin ddm output page scene discretize estimate run api commands internals cli main";
 
 /// Modules that may use less than what lies below them.
 const NARROW: [(&str, &str); 7] = [

@@ -174,13 +174,14 @@ fn answer<const D: usize>(solution: &Solution, change: &Change, factors: &Factor
         // what is below a point gives way by its pressure over E/h
         let spacing = table.weight.iter().map(|w| (w / per_point).powf(1.0 / (D - 1) as f64)).fold(f64::MAX, f64::min);
         let (layer, body) = (2.0 * stiffest.fold(0.0, f64::max) * l / s, modulus / spacing);
-        let peak = pair.peak_pressure / s;
+        let result = &pair.result;
+        let peak = result.peak_pressure / s;
         PairAnswer {
-            force: change.back(pair.force[0]).map(|f| f / force),
-            moment: change.moment_back(pair.force[0], pair.moment[0], force),
+            force: change.back(result.force[0]).map(|f| f / force),
+            moment: change.moment_back(result.force[0], result.moment[0], force),
             peak,
-            area: pair.extent.contact() / per_point,
-            approach: pair.approach.map(|approach| approach / l),
+            area: result.extent.contact() / per_point,
+            approach: result.approach.map(|approach| approach / l),
             sensitive: peak / layer.min(body),
             points: table.compression.iter().zip(&table.weight).map(|(c, w)| [c / l, w / per_point]).collect(),
         }

@@ -102,8 +102,12 @@ fn two_pairs_far_from_each_other(session: &Session) {
     let solution = solve(session, scene).expect("solved");
     for pair in &solution.report().pairs {
         // coordinates have eleven digits of a body here, and gaps of 1e-4 eight
-        assert!((pair.peak_pressure - own.pairs[0].peak).abs() < 1e-5 * own.pairs[0].peak, "{}", pair.peak_pressure);
-        assert!((pair.extent.contact() - 1.0).abs() < 1e-9, "{}", pair.extent.contact());
+        assert!(
+            (pair.result.peak_pressure - own.pairs[0].peak).abs() < 1e-5 * own.pairs[0].peak,
+            "{}",
+            pair.result.peak_pressure
+        );
+        assert!((pair.result.extent.contact() - 1.0).abs() < 1e-9, "{:?}", pair.result.extent);
         assert_eq!(pair.pieces_lost, 0);
     }
     // moments are about the origin of the scene, wherever coordinates are measured from
@@ -114,7 +118,7 @@ fn two_pairs_far_from_each_other(session: &Session) {
         &body.balance.loads
     };
     let [near, other] = ["upper", "upper_2"].map(loads);
-    let pairs = [0, 1].map(|i| (&report.pairs[i].force[1], &report.pairs[i].moment[1]));
+    let pairs = [0, 1].map(|i| (&report.pairs[i].result.force[1], &report.pairs[i].result.moment[1]));
     for [(force, moment), (_, far_moment)] in [[(&near.force, &near.moment), (&other.force, &other.moment)], pairs] {
         let arm = cross(change.shift, *force);
         let size = force.iter().map(|f| f.abs()).sum::<f64>();

@@ -4,7 +4,7 @@ use crate::common::blocks::Blocks;
 use crate::common::vtu::Grid;
 use crate::common::{Run, Scene, Table, case, distance, root, solve, text_of, winkler};
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The groove with the lower block on a support that is lifted and the upper one pressed, each by its own factor.
 fn groove(steps: &str) -> Scene {
@@ -234,8 +234,15 @@ fn fields_of_all_steps_are_a_series_in_time() {
             (displacement(&run.folder.join(format!("{step}.vtu"))), displacement(&alone.folder.join("upper.vtu")));
         assert!(distance(&ours, &theirs) < 1e-8, "{step}");
     }
-    // nobody asked
-    assert!(!solve(with_table(PATH), &[]).folder.join("steps").exists());
+    // nobody asked for fields, or for tables of pairs
+    let steps = |sets: &[&str]| -> Vec<PathBuf> {
+        let run = solve(with_table(PATH), sets);
+        fs::read_dir(run.folder.join("steps"))
+            .map_or(Vec::new(), |files| files.flatten().map(|file| file.path()).collect())
+    };
+    let tables = steps(&[]);
+    assert!(!tables.is_empty() && tables.iter().all(|path| path.extension().is_some_and(|ending| ending == "csv")));
+    assert!(steps(&["--set", "output.pairs=0"]).is_empty());
 }
 
 #[test]

@@ -412,3 +412,27 @@ fn a_bond_carries_no_shear() {
         }
     }
 }
+
+/// Two blocks on a base slide, each under a force that nearly presses straight down: one line names both, with the larger lack of balance.
+#[test]
+fn bodies_with_the_same_motion_have_one_line() {
+    const BLOCKS: &str = "SetFactory(\"OpenCASCADE\"); Rectangle(1) = {-5, -1, 0, 10, 1}; Rectangle(2) = {-4, 0, 0, 2, 1}; Rectangle(3) = {2, 0, 0, 2, 1};
+        MeshSize {:} = 0.5; Physical Surface(\"base\") = {1}; Physical Surface(\"a\") = {2}; Physical Surface(\"b\") = {3};
+        Physical Curve(\"foot\") = {1}; Physical Curve(\"top\") = {3}; Physical Curve(\"a_low\") = {5}; Physical Curve(\"b_low\") = {9};\n";
+    let body = |name: &str, keys: &str| format!("[[body]]\nname = \"{name}\"\nyoung = 1e4\npoisson = 0.3\n{keys}\n");
+    let contact = |on: &str| {
+        format!("[[contact]]\nbetween = [\"top\", \"{on}\"]\nlayer = {{ linear = {{ stiffness = 1e5 }} }}\n")
+    };
+    let scene = Scene::new(format!(
+        "dimension = 2\nmesh = \"blocks.geo\"\n{}{}{}{}{}",
+        body("base", "fix = [{ on = \"foot\", x = 0, y = 0 }]"),
+        body("a", "force = [1e-7, -1]"),
+        body("b", "force = [3e-7, -1]"),
+        contact("a_low"),
+        contact("b_low"),
+    ));
+    std::fs::write(scene.path.with_file_name("blocks.geo"), BLOCKS).expect("a script");
+    let run = solve(&scene, &[]).converged();
+    let line = "bodies `a` and `b`: nothing holds each of them in its translation along x, and the loads lack balance there by up to 3.0e-07 of";
+    assert!(run.warnings().contains(line) && run.warnings().matches("nothing holds").count() == 1, "{}", run.said());
+}

@@ -11,7 +11,7 @@ fn groove(method: &str, more: &[&str]) -> Run {
 fn step(run: &Run, number: usize) -> (f64, f64, usize) {
     let pair = format!("steps/{number}/pairs/0");
     let closed = run.count(&format!("{pair}/closed"));
-    (run.number(&format!("{pair}/force/1")), run.number(&format!("{pair}/peak_pressure")), closed)
+    (run.number(&format!("{pair}/force/0/1")), run.number(&format!("{pair}/peak_pressure")), closed)
 }
 
 /// The same of a run without steps.

@@ -116,7 +116,7 @@ fn attempt(session: &Session, path: &Path, recipe: &Recipe, residual: f64) -> Re
     let done = run::iterate(ready, &interrupt, &mut Silent, &mut clock)?;
     let seconds = clock.total();
     let recovered = results::recover(&done);
-    let report = report::report(session, &done, &recovered, &clock);
+    let report = report::report(session, &done, &recovered, None, &clock);
     let (model, outcome) = (&done.built.discrete.model, done.outcome);
     Ok(Answer {
         status: report.status,

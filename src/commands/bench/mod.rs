@@ -10,7 +10,7 @@ pub use plan::BenchArgs;
 
 use super::cases::Case;
 use super::inputs;
-use super::rows::{Row, aligned};
+use super::rows::{CaseRow, aligned};
 use crate::error::Result;
 use crate::interrupt::Interrupt;
 use crate::output::{Folder, RowFile, say, sci, seconds, terminal};
@@ -48,7 +48,7 @@ pub fn bench(interrupt: &Interrupt, request: &BenchArgs) -> Result<i32> {
     for case in &bench.plan.cases {
         bar.set_message(case.label.clone());
         let mut row = if bench.is_beyond(case, &rows) {
-            Row::unsolved("skipped", "an earlier mesh took too long")
+            CaseRow::unsolved("skipped", "an earlier mesh took too long")
         } else {
             bench.measure(case, &runner, reference.as_deref(), &mut meshed)?
         };
@@ -110,12 +110,12 @@ impl Benchmark {
         runner: &Runner,
         reference: Option<&[PairPoints]>,
         meshed: &mut BTreeSet<Vec<String>>,
-    ) -> Result<Row> {
+    ) -> Result<CaseRow> {
         let scene = match crate::scene::load(&case.scene, &case.overrides) {
             Ok(scene) => scene,
             Err(error) => {
                 let help = error.advice().map_or(String::new(), |help| format!("; help: {help}"));
-                return Ok(Row::unsolved("refused", &format!("error: {}{help}", error.message())));
+                return Ok(CaseRow::unsolved("refused", &format!("error: {}{help}", error.message())));
             }
         };
         // the mesh is made before times are measured
@@ -187,7 +187,7 @@ impl Benchmark {
 /// A column of the table on the terminal.
 struct Shown {
     heading: &'static str,
-    text: fn(&Row) -> Option<String>,
+    text: fn(&CaseRow) -> Option<String>,
 }
 
 const SHOWN: [Shown; 9] = [

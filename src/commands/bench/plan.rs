@@ -1,7 +1,7 @@
 //! The command line of `winkler bench`, and the cases that it asks for.
 
-use crate::commands::cases::{Axis, AxisValue, Case, Plan};
-use crate::commands::rows::Row;
+use crate::commands::cases::{AxisValue, Case, CaseAxis, CasePlan};
+use crate::commands::rows::CaseRow;
 use crate::commands::{case_of, folder_of};
 use crate::error::{Error, Kind, Result};
 use crate::problem::{MeshSource, Order, Preset};
@@ -62,7 +62,7 @@ pub(super) const COLUMNS: [&str; 4] = ["order", "asked", "solver", "ranks"];
 /// The row of a case.
 pub(super) struct Measured {
     pub case: Case,
-    pub row: Row,
+    pub row: CaseRow,
 }
 
 /// The scenes of a benchmark and its cases.
@@ -71,7 +71,7 @@ pub(super) struct Benchmark {
     pub scenes: Vec<Scene>,
     /// Their names in the table.
     pub names: Vec<String>,
-    pub plan: Plan,
+    pub plan: CasePlan,
 }
 
 impl Benchmark {
@@ -80,7 +80,7 @@ impl Benchmark {
     /// # Errors
     /// Scenes that cannot be read, lists that make no sense.
     pub fn new(request: &BenchArgs) -> Result<Self> {
-        let over = request.over.iter().map(|text| Axis::over(text)).collect::<Result<Vec<_>>>()?;
+        let over = request.over.iter().map(|text| CaseAxis::over(text)).collect::<Result<Vec<_>>>()?;
         if over.iter().any(|axis| axis.name == "solver") {
             return Err(usage("`--over solver=...` would hide the solvers of the table").help("--solver mumps,hypre"));
         }
@@ -96,11 +96,11 @@ impl Benchmark {
         let scenes = request.scenes.iter().map(|path| crate::scene::load(path, common)).collect::<Result<Vec<_>>>()?;
         let names = names(&scenes);
         let keys = over.iter().map(|axis| axis.name.as_str());
-        let mut plan = Plan::new(["scene"].into_iter().chain(keys).chain(COLUMNS).map(str::to_owned).collect());
+        let mut plan = CasePlan::new(["scene"].into_iter().chain(keys).chain(COLUMNS).map(str::to_owned).collect());
         let output = OUTPUT.map(str::to_owned);
         for (scene, name) in scenes.iter().zip(&names) {
-            let mut axes = vec![Axis::new("scene", vec![AxisValue::new(name, Vec::new())])];
-            axes.extend(over.iter().map(|axis| Axis::new(&axis.name, axis.values.clone())));
+            let mut axes = vec![CaseAxis::new("scene", vec![AxisValue::new(name, Vec::new())])];
+            axes.extend(over.iter().map(|axis| CaseAxis::new(&axis.name, axis.values.clone())));
             axes.extend(own_axes(scene, request, &solvers));
             plan.add(scene.path.clone(), &axes, &[&common[..], &output].concat(), &request.petsc);
         }
@@ -119,7 +119,7 @@ impl Benchmark {
 }
 
 /// Return the axes of a scene behind those of `--over`, from the slowest to the fastest, in the order of [`COLUMNS`].
-fn own_axes(scene: &Scene, request: &BenchArgs, solvers: &[AxisValue]) -> impl Iterator<Item = Axis> {
+fn own_axes(scene: &Scene, request: &BenchArgs, solvers: &[AxisValue]) -> impl Iterator<Item = CaseAxis> {
     let of_order = |order: &usize| {
         let bodies = 0..scene.bodies.len();
         AxisValue::new(order.to_string(), bodies.map(|body| format!("body.{body}.order={order}")).collect())
@@ -136,7 +136,7 @@ fn own_axes(scene: &Scene, request: &BenchArgs, solvers: &[AxisValue]) -> impl I
     }
     let ranks = request.ranks.iter().map(|ranks| AxisValue::new(ranks.to_string(), Vec::new())).collect();
     let values = [orders, methods, solvers.to_vec(), ranks];
-    COLUMNS.into_iter().zip(values).map(|(name, values)| Axis::new(name, values))
+    COLUMNS.into_iter().zip(values).map(|(name, values)| CaseAxis::new(name, values))
 }
 
 /// Return whether a column is a key of the mesh.

@@ -1,7 +1,7 @@
 //! The plots of a benchmark: time against error, and time, memory and inner iterations against the degrees of freedom.
 
 use super::plan::{Benchmark, Measured, is_of_mesh};
-use crate::commands::rows::Row;
+use crate::commands::rows::CaseRow;
 use crate::linalg::fit;
 use crate::output::{Color, Plot, PlotAxis, Series, Style, safe_name};
 
@@ -29,7 +29,7 @@ pub(super) fn plots(rows: &[Measured], bench: &Benchmark) -> Vec<(String, Plot)>
 const KINDS: [&str; 4] = ["time-error", "time-dofs", "memory-dofs", "iterations-dofs"];
 
 /// Return the inner iterations of a run; none if its solvers are direct.
-fn iterations(row: &Row) -> Option<f64> {
+fn iterations(row: &CaseRow) -> Option<f64> {
     row.inner_iterations.filter(|count| *count > 0).map(|count| count as f64)
 }
 
@@ -63,7 +63,7 @@ impl Chart<'_> {
     }
 
     /// Return the time of a run that plots show.
-    fn time(&self, row: &Row) -> Option<f64> {
+    fn time(&self, row: &CaseRow) -> Option<f64> {
         if self.is_serial() { row.cpu_seconds } else { row.seconds }
     }
 
@@ -85,7 +85,7 @@ impl Chart<'_> {
 
     /// Return the plot of a number against the dofs, with the exponent of the fitted power law in the name of each
     /// curve.
-    fn against_dofs(&self, number: impl Fn(&Row) -> Option<f64>, label: &str) -> Option<Plot> {
+    fn against_dofs(&self, number: impl Fn(&CaseRow) -> Option<f64>, label: &str) -> Option<Plot> {
         let mut series = self.series(|row| Some((row.dofs? as f64, number(row)?)));
         for series in &mut series {
             let power = exponent(&series.points).map(|power| format!(" (dofs^{power:.2})"));
@@ -96,7 +96,7 @@ impl Chart<'_> {
 
     /// Return the points (x, y) of each curve, sorted by x. The rows of a curve differ only in the keys of the mesh,
     /// and its name has the other values that differ between rows, with the method that ran.
-    fn series(&self, point: impl Fn(&Row) -> Option<(f64, f64)>) -> Vec<Series> {
+    fn series(&self, point: impl Fn(&CaseRow) -> Option<(f64, f64)>) -> Vec<Series> {
         let plan = &self.bench.plan;
         let keys: Vec<Vec<String>> = self.rows.iter().map(|measured| self.key(measured)).collect();
         let mut named = plan.varied(keys.iter());

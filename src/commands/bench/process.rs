@@ -2,17 +2,16 @@
 
 use super::plan::usage;
 use crate::commands::cases::Case;
-use crate::commands::rows::Row;
+use crate::commands::rows::CaseRow;
 use crate::error::{Error, Kind, Result};
 use crate::file::digest;
 use crate::interrupt::{self, Interrupt};
 use crate::linalg::range;
 use crate::output::folder::{MARK, REPORT, is_made, refuse_link};
-use crate::output::{Folder, refuse_foreign, safe_name, write_whole};
+use crate::output::{Folder, Report, refuse_foreign, safe_name, write_whole};
 use crate::parallel::launcher;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
-use serde_json::Value;
 use std::fs::{self, File};
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
@@ -102,17 +101,17 @@ impl Runner {
 
     /// Run a case as often as asked for, or until it fails, and return its row: that of the first run that failed, else
     /// of the first, with the medians of all times.
-    pub fn repeat(&self, case: &Case, ranks: usize) -> Result<Row> {
+    pub fn repeat(&self, case: &Case, ranks: usize) -> Result<CaseRow> {
         let mut rows = Vec::new();
-        while rows.len() < self.repeat && rows.iter().all(Row::is_good) {
+        while rows.len() < self.repeat && rows.iter().all(CaseRow::is_good) {
             rows.push(self.run(case, ranks)?);
         }
-        let of = |number: fn(&Row) -> Option<f64>| median(rows.iter().filter_map(number).collect());
+        let of = |number: fn(&CaseRow) -> Option<f64>| median(rows.iter().filter_map(number).collect());
         let times: Vec<f64> = rows.iter().filter_map(|row| row.seconds).collect();
         let seconds = of(|row| row.seconds);
         let [least, most] = range(times.iter().copied());
         let spread = seconds.map(|middle| (most - least) / middle);
-        Ok(Row {
+        Ok(CaseRow {
             runs: rows.len(),
             seconds,
             spread: spread.filter(|_| rows.len() > 1),
@@ -128,7 +127,7 @@ impl Runner {
         })
     }
 
-    fn run(&self, case: &Case, ranks: usize) -> Result<Row> {
+    fn run(&self, case: &Case, ranks: usize) -> Result<CaseRow> {
         let folder = self.folder(case);
         let mut command = match ranks {
             1 => Command::new(&self.program),
@@ -151,15 +150,16 @@ impl Runner {
         Folder::create(&folder)?.clear()?;
         let ended = self.finish(command, &folder)?;
         let report = fs::read(folder.join(REPORT)).ok().filter(|_| is_made(&folder.join(REPORT)));
-        let report = report.and_then(|bytes| serde_json::from_slice::<Value>(&bytes).ok());
+        let report = report.map(|bytes| serde_json::from_slice::<Report>(&bytes));
         let row = match (ended.used.as_ref(), report) {
-            (None, _) => Row::unsolved("failed", &ended.output),
-            _ if ended.is_late => Row::unsolved("timeout", &format!("not ended after {:?}", self.timeout)),
-            (_, Some(report)) => Row::of_report(&report),
-            (Some(used), None) => Row::unsolved(status_of(used.status), &message(&ended.output, used.status)),
+            (None, _) => CaseRow::unsolved("failed", &ended.output),
+            _ if ended.is_late => CaseRow::unsolved("timeout", &format!("not ended after {:?}", self.timeout)),
+            (_, Some(Ok(report))) => CaseRow::from(&report),
+            (_, Some(Err(cause))) => CaseRow::unsolved("failed", &format!("its report cannot be read: {cause}")),
+            (Some(used), None) => CaseRow::unsolved(status_of(used.status), &message(&ended.output, used.status)),
         };
         let cpu = |used: &ResUse| (used.rusage.utime + used.rusage.stime).as_secs_f64();
-        Ok(Row {
+        Ok(CaseRow {
             seconds: Some(ended.seconds).filter(|seconds| seconds.is_finite()),
             cpu_seconds: ended.used.as_ref().map(cpu),
             memory_mb: ended.used.as_ref().map(|used| used.rusage.maxrss as f64 / 1e6),

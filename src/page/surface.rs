@@ -9,7 +9,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// Faces of a tetrahedron, oriented as seen from outside, with the mid-edges of a quadratic one.
 const FACES: [[usize; 6]; 4] = [[0, 2, 1, 6, 5, 4], [0, 1, 3, 4, 8, 7], [1, 2, 3, 5, 9, 8], [0, 3, 2, 7, 9, 6]];
@@ -20,6 +20,8 @@ const FACES: [[usize; 6]; 4] = [[0, 2, 1, 6, 5, 4], [0, 1, 3, 4, 8, 7], [1, 2, 3
 pub struct Surface {
     /// Name of the body or surface.
     pub name: String,
+    /// Index of the body, or of the first body of a contact surface.
+    pub body: usize,
     /// Points before deformation.
     points: Vec<[f64; 3]>,
     /// Displacement at each point.
@@ -62,7 +64,7 @@ impl Surface {
     }
 
     /// Return the surface of a pair with its pressures.
-    pub fn of_contact(grid: UnstructuredGrid) -> Self {
+    pub fn of_contact(grid: UnstructuredGrid, body: usize) -> Self {
         let values = |name: &str| {
             let array = grid.at_points.iter().find(|array| array.name == name);
             array.map_or(Vec::new(), |array| array.values.clone())
@@ -72,6 +74,7 @@ impl Surface {
             value: values("pressure"),
             opening: values("compression").into_iter().map(|c| (-c).max(0.0)).collect(),
             name: grid.title,
+            body,
             points: grid.points,
             faces: grid.connectivity.chunks_exact(grid.cell.stride()).map(<[u32]>::to_vec).collect(),
             ..Self::default()
@@ -172,6 +175,7 @@ impl Surface {
         };
         json!({
             "name": self.name,
+            "body": self.body,
             "points": STANDARD.encode(floats(&points)),
             "displacement": STANDARD.encode(floats(&self.displacement)),
             "value": scaled(&self.value, ends),
@@ -244,7 +248,7 @@ const COLORS: [&str; 12] = [
 ];
 
 /// Return the numbers of the view of bodies and contact surfaces, which `viewer.js` reads.
-pub fn view(bodies: &[Surface], contacts: &[Surface], is_space: bool) -> Value {
+pub fn view(bodies: &[Surface], contacts: &[Surface], marks: &[Mark], is_space: bool) -> Value {
     let [low, high] = bounds(bodies.iter().chain(contacts).flat_map(|part| &part.points).copied());
     let stress = range(bodies.iter().flat_map(|part| part.value.iter().copied()));
     let [_, most] = range(contacts.iter().flat_map(|part| part.value.iter().copied()));
@@ -263,7 +267,29 @@ pub fn view(bodies: &[Surface], contacts: &[Surface], is_space: bool) -> Value {
         "scale": magnification(bodies),
         "space": is_space,
         "colors": COLORS,
+        "roles": roles(marks),
     })
+}
+
+/// Most groups of a role that its legend names.
+const NAMES: usize = 24;
+
+/// Return the roles of marked places, each with the words of its legend, which name the groups, and its colour.
+fn roles(marks: &[Mark]) -> Vec<[String; 3]> {
+    let all = [
+        (Role::Support, "support", "supports", "#0072b2"),
+        (Role::Load, "load", "loads", "#d55e00"),
+        (Role::Spring, "spring", "springs", "#e69f00"),
+        (Role::Contact, "closed", "closed contact", "#cc3fa0"),
+        (Role::Contact, "open", "open contact", "#5c6670"),
+    ];
+    let legend = |(role, name, words, color): (Role, &str, &str, &str)| {
+        let on: BTreeSet<&str> = marks.iter().filter(|mark| mark.role == role).map(|mark| mark.on.as_str()).collect();
+        let names = on.iter().take(NAMES).copied().collect::<Vec<_>>().join(", ");
+        let more = if on.len() > NAMES { ", ..." } else { "" };
+        (!on.is_empty()).then(|| [name.to_owned(), format!("{words}: {names}{more}"), color.to_owned()])
+    };
+    all.into_iter().filter_map(legend).collect()
 }
 
 fn relative(low: [f64; 3], x: &[f64; 3]) -> [f64; 3] {

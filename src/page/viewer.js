@@ -1,9 +1,4 @@
 // Bodies in space: drag turns, shift or right button moves, wheel or two fingers zoom. In the plane drag moves.
-// Colours of marked places, and the direction of their hatching.
-const MARKS = Object.fromEntries([
-  ["support", "#00a5ff", 1], ["load", "#e8000b", -1], ["spring", "#ff9500", 1], ["closed", "#ff2fd0", -1], ["open", "#111111", -1],
-].map(([name, color, hatch]) => [name, { color: [1, 3, 5].map(k => parseInt(color.slice(k, k + 2), 16) / 255), hatch }]));
-
 (() => {
   const data = JSON.parse(document.getElementById("view").textContent);
   const figure = document.getElementById("bodies"), canvas = figure.querySelector("canvas");
@@ -13,6 +8,7 @@ const MARKS = Object.fromEntries([
     return;
   }
   const bytes = text => Uint8Array.from(atob(text), c => c.charCodeAt(0)).buffer;
+  const rgb = color => [1, 3, 5].map(k => parseInt(color.slice(k, k + 2), 16) / 255);
   const program = twgl.createProgramInfo(gl, [`#version 300 es
     in vec3 point, displacement; in float value, known;
     uniform mat4 view; uniform float scale, travels; uniform vec2 travel; uniform vec3 nudge;
@@ -27,11 +23,9 @@ const MARKS = Object.fromEntries([
     }`, `#version 300 es
     precision highp float;
     in vec2 shade; in vec3 place; out vec4 color;
-    uniform vec3 colors[12], toward; uniform vec4 cut, ink; uniform vec2 ends; uniform float squares, opens, hatch;
+    uniform vec3 colors[12], toward; uniform vec4 cut, ink; uniform vec2 ends; uniform float squares, opens;
     void main() {
       if (dot(place, cut.xyz) > cut.w) discard;
-      // marked surfaces are hatched
-      if (hatch != 0.0 && mod(gl_FragCoord.x + hatch * gl_FragCoord.y, 10.0) > 4.0) discard;
       vec3 normal = normalize(cross(dFdx(place), dFdy(place)));
       float light = 0.55 + 0.45 * abs(dot(normal, toward));
       // nodes without a value take part in none: the others alone make it
@@ -41,9 +35,9 @@ const MARKS = Object.fromEntries([
       // beyond a section the inner side of the surface is seen, which is grey like points without a value
       bool inner = cut.xyz != vec3(0.0) && !gl_FrontFacing;
       bool none = shade.y < 0.5 || (opens > 0.5 && value < 0.5 / 65534.0);
-      vec3 paint = inner || none ? vec3(0.72) : colors[band];
-      // lines have ink
-      color = ink.a > 0.5 ? ink : vec4(paint * light, 1.0);
+      vec3 paint = inner || none ? vec3(0.72) : ink.a > 0.0 ? ink.rgb : colors[band];
+      // lines and points, whose ink is opaque, have no light
+      color = ink.a == 1.0 ? ink : vec4(paint * light, 1.0);
     }`]);
   // the edges that belong to one triangle alone
   const rim = (triangles, points) => {
@@ -71,13 +65,13 @@ const MARKS = Object.fromEntries([
     const indices = list => list.length ? made({ indices: list }) : null;
     // bodies in the plane have outlines
     const outline = indices(data.space ? [] : rim(arrays.indices, arrays.point.data.length / 3));
-    const marks = part.marks.map(([name, kinds]) => ({ name, buffers: kinds.map(kind => indices(new Uint32Array(bytes(kind)))) }));
-    return { kind, name: part.name, shown: true, fields, outline, arrays, marks };
+    const marks = part.marks.map(([role, kinds]) => ({ role, buffers: kinds.map(kind => indices(new Uint32Array(bytes(kind)))) }));
+    return { kind, name: part.name, body: part.body, shown: true, fields, outline, arrays, marks };
   };
   const parts = [...data.bodies.map(b => part(b, "body")), ...data.surfaces.map(s => part(s, "surface"))];
   const middle = data.low.map((low, k) => (low + data.high[k]) / 2);
   const size = Math.hypot(...data.low.map((low, k) => data.high[k] - low)) || 1;
-  const colors = data.colors.flatMap(c => [1, 3, 5].map(k => parseInt(c.slice(k, k + 2), 16) / 255));
+  const colors = data.colors.flatMap(rgb), roles = Object.fromEntries(data.roles.map(([role, , color]) => [role, rgb(color)]));
   const eye = {};
   const reset = () => {
     const [turn, rise] = data.space ? [-0.9, 0.45] : [-Math.PI / 2, Math.PI / 2], aspect = canvas.clientWidth / canvas.clientHeight || 1;
@@ -89,17 +83,18 @@ const MARKS = Object.fromEntries([
     Object.assign(eye, { turn, rise, zoom: 0.5 * size / fits || 1, right: 0, up: 0 });
   };
   const [what, across] = figure.querySelectorAll("select"), [scale, depth] = figure.querySelectorAll("input[type=range]");
-  const typed = figure.querySelectorAll("input[type=number]"), marked = figure.querySelector(".marks input");
+  const typed = figure.querySelectorAll("input[type=number]"), [again, save] = figure.querySelectorAll("button");
   // fields of contact surfaces; all others are those of bodies
   const ofContact = () => what.value === "pressure" || what.value === "opening";
   const isDrawn = part => part.shown && ofContact() === (part.kind === "surface");
   const fieldOf = part => part.fields[what.value === "opening" ? "opening" : "value"];
-  // the ends of the colours: those that were typed, or the smallest and the largest value
+  // the smallest and the largest value, and the ends of the colours: those that were typed, or these; places have no values
+  const range = () => data[what.value] ?? [0, 1];
   const ends = () => {
-    const own = [...typed].map((input, k) => input.value.trim() === "" || !Number.isFinite(+input.value) ? data[what.value][k] : +input.value);
-    return own[0] < own[1] ? own : data[what.value];
+    const own = [...typed].map((input, k) => input.value.trim() === "" || !Number.isFinite(+input.value) ? range()[k] : +input.value);
+    return own[0] < own[1] ? own : range();
   };
-  const shown = figure.querySelector("output"), bar = figure.querySelector(".bar"), open = figure.querySelector(".open");
+  const shown = figure.querySelector("output"), bar = figure.querySelector(".bar");
   const factor = () => scale.value / 50 * data.scale;
   // the plane of the section: what lies beyond it along x, y or z is not drawn
   const section = () => {
@@ -135,10 +130,10 @@ const MARKS = Object.fromEntries([
       return `<line x2="${22 * right}" y2="${22 * up}"/><text x="${31 * right}" y="${31 * up}">${name}</text>`;
     }).join("");
     gl.useProgram(program.program);
-    const contact = ofContact(), [low, high] = data[what.value];
+    const [low, high] = range(), isPlaces = what.value === "places";
     // the colour of the text around
     const ink = [...getComputedStyle(figure).color.match(/\d+/g).slice(0, 3).map(part => part / 255), 1];
-    const lit = { view: eye.view, toward, colors, cut: section(), scale: factor(), travel: data.travel, nudge: [0, 0, 0], hatch: 0 };
+    const lit = { view: eye.view, toward, colors, cut: section(), scale: factor(), travel: data.travel, nudge: [0, 0, 0] };
     const shares = ends().map(end => (end - low) / (high - low));
     const draw = (buffer, uniforms, kind) => {
       twgl.setBuffersAndAttributes(gl, program, buffer);
@@ -146,39 +141,67 @@ const MARKS = Object.fromEntries([
       twgl.drawBufferInfo(gl, buffer, kind);
     };
     for (const part of parts.filter(isDrawn)) {
-      const { buffer } = fieldOf(part);
       const [travels, squares] = ["travel", "stress"].map(value => what.value === value ? 1 : 0);
-      draw(buffer, { ...lit, ends: shares, travels, squares, opens: contact ? 1 : 0, ink: [0, 0, 0, 0] });
+      const plain = isPlaces ? [0.82, 0.84, 0.87, 0.5] : [0, 0, 0, 0];
+      draw(fieldOf(part).buffer, { ...lit, ends: shares, travels, squares, opens: ofContact() ? 1 : 0, ink: plain });
       if (part.outline) draw(part.outline, { ink }, gl.LINES);
-      if (marked?.checked) drawMarks(part, draw);
+      if (isPlaces) drawPlaces(part, draw);
     }
     shown.textContent = "× " + number(factor());
   }
-  // lines are drawn beside each other to be as wide as five pixels, and all marks lie a little before their surfaces
-  function drawMarks(part, draw) {
+  // lines are drawn beside each other to be as wide as five pixels, and all places lie a little before their surfaces
+  function drawPlaces(part, draw) {
     const before = -1e-4, [right, up] = [2 / canvas.width, 2 / canvas.height], wide = [-2, -1, 0, 1, 2];
-    for (const { name, buffers: [triangles, lines, points] } of part.marks) {
-      const { color, hatch } = MARKS[name], ink = [...color, 1];
-      if (triangles) draw(triangles, { ink, hatch, nudge: [0, 0, before] });
+    for (const { role, buffers: [triangles, lines, points] } of part.marks) {
+      if (triangles) draw(triangles, { ink: [...roles[role], 0.5], nudge: [0, 0, before] });
+      const ink = [...roles[role], 1];
       for (const [x, y] of lines ? wide.flatMap(x => wide.map(y => [x, y])) : [])
-        draw(lines, { ink, hatch: 0, nudge: [x * right, y * up, before] }, gl.LINES);
-      if (points) draw(points, { ink, hatch: 0, nudge: [0, 0, 2 * before] }, gl.POINTS);
+        draw(lines, { ink, nudge: [x * right, y * up, before] }, gl.LINES);
+      if (points) draw(points, { ink, nudge: [0, 0, 2 * before] }, gl.POINTS);
     }
   }
+  // the colours below the picture, with the values at which they begin, or with what has them
   function legend() {
-    const [low, high] = ends();
-    bar.replaceChildren(...data.colors.map((color, k) => {
+    const [low, high] = ends(), isPlaces = what.value === "places";
+    const cell = (text, color) => {
       const cell = document.createElement("span");
-      cell.style.background = color;
-      const share = what.value === "stress" ? (k / 12) ** 2 : k / 12;
-      cell.textContent = k % 3 ? "" : number(low + (high - low) * share);
+      color ? cell.style.background = color : cell.className = "end";
+      cell.textContent = text;
       return cell;
-    }), "to " + number(high));
-    typed.forEach((input, k) => { input.placeholder = number(data[what.value][k]); });
-    open.hidden = !ofContact();
-    open.lastElementChild.textContent = what.value === "opening" ? "closed" : "open: no pressure";
+    };
+    const begin = k => low + (high - low) * (what.value === "stress" ? (k / 12) ** 2 : k / 12);
+    const cells = data.colors.map((color, k) => cell(k % 3 ? "" : number(begin(k)), color));
+    const none = what.value === "opening" ? "closed" : "open: no pressure";
+    bar.replaceChildren(...isPlaces ? data.roles.map(([, text, color]) => cell(text, color))
+      : [...cells, cell("to " + number(high)), ...ofContact() ? [cell(none, "#b8b8b8")] : []]);
+    bar.classList.toggle("roles", isPlaces);
+    typed.forEach((input, k) => { input.placeholder = number(range()[k]); input.disabled = isPlaces; });
     if (depth) depth.hidden = !across.value;
     redraw();
+  }
+  // the picture with its colours as a file
+  function savePicture() {
+    draw();
+    const picture = document.createElement("canvas"), pen = picture.getContext("2d"), box = bar.getBoundingClientRect();
+    const ratio = canvas.width / canvas.clientWidth, line = 24 * ratio;
+    [picture.width, picture.height] = [canvas.width, canvas.height + line + box.height * ratio];
+    pen.fillStyle = "#fff";
+    pen.fillRect(0, 0, picture.width, picture.height);
+    pen.drawImage(canvas, 0, 0);
+    pen.font = `${12 * ratio}px sans-serif`;
+    pen.fillStyle = "#000";
+    pen.fillText(`${document.title}: ${what.selectedOptions[0].text}`, 4 * ratio, canvas.height + 16 * ratio);
+    const at = cell => [cell.getBoundingClientRect()].map(b => [(b.left - box.left) * ratio, canvas.height + line + (b.top - box.top) * ratio, b.width * ratio, b.height * ratio])[0];
+    for (const cell of bar.children) if (cell.style.background) { pen.fillStyle = cell.style.background; pen.fillRect(...at(cell)); }
+    for (const cell of bar.children) {
+      const [x, y] = at(cell);
+      pen.fillStyle = cell.style.background ? "#fff" : "#000";
+      pen.fillText(cell.textContent, x + 2 * ratio, y + 15 * ratio);
+    }
+    const link = document.createElement("a");
+    link.download = `${document.title}.png`;
+    link.href = picture.toDataURL();
+    link.click();
   }
 
   // the nearest point of what is drawn at a place of the picture (-1 to 1 to the right and up): its part, its place before deformation and its value
@@ -211,11 +234,12 @@ const MARKS = Object.fromEntries([
   };
   // the value of a hit in words
   const told = ({ part, nodes, shares, place }) => {
-    const [low, high] = data[what.value], { values } = fieldOf(part);
+    const at = place.slice(0, data.space ? 3 : 2).map((x, k) => number(x + data.origin[k])).join(", ");
+    if (what.value === "places") return `${part.name} at (${at})`;
+    const [low, high] = range(), { values } = fieldOf(part);
     const size = node => Math.hypot(...part.arrays.displacement.data.subarray(3 * node, 3 * node + 3));
     const value = node => what.value === "travel" ? size(node) : values[node] === 65535 ? NaN : low + values[node] / 65534 * (high - low);
     const mean = nodes.reduce((sum, node, k) => sum + shares[k] * value(node), 0);
-    const at = place.slice(0, data.space ? 3 : 2).map((x, k) => number(x + data.origin[k])).join(", ");
     return `${part.name} at (${at}): ${Number.isNaN(mean) ? "open" : number(mean)} (${what.selectedOptions[0].text})`;
   };
   let pointing = null;
@@ -258,11 +282,13 @@ const MARKS = Object.fromEntries([
   what.addEventListener("change", () => { typed.forEach(input => { input.value = ""; }); legend(); });
   across?.addEventListener("change", legend);
   typed.forEach(input => input.addEventListener("input", legend));
-  marked?.addEventListener("change", redraw);
   for (const slider of [scale, depth]) slider?.addEventListener("input", redraw);
-  figure.querySelector("button").addEventListener("click", () => { reset(); redraw(); });
-  for (const box of figure.querySelectorAll("input[type=checkbox][value]"))
-    box.addEventListener("change", () => { parts[box.value].shown = box.checked; redraw(); });
+  again.addEventListener("click", () => { reset(); redraw(); });
+  save.addEventListener("click", savePicture);
+  for (const box of figure.querySelectorAll("input[type=checkbox]")) box.addEventListener("change", () => {
+    parts.filter(part => part.body === +box.value).forEach(part => { part.shown = box.checked; });
+    redraw();
+  });
   new ResizeObserver(redraw).observe(canvas);
   reset();
   legend();
