@@ -198,12 +198,16 @@ impl Discrete {
     }
 
     /// Let the layers that remember have had compressions up to `largest`, n; empty for none.
-    pub fn remember(&mut self, largest: &[f64]) {
+    ///
+    /// # Errors
+    /// A law of unloading is too soft.
+    pub fn remember(&mut self, largest: &[f64]) -> Result<()> {
         let model = &mut self.model;
         for i in (0..model.pairs.len()).filter(|_| !largest.is_empty()) {
-            let range = model.range(i);
-            model.pairs[i].law.remember(&largest[range]);
+            let (range, spec) = (model.range(i), &self.specs[i]);
+            model.pairs[i].law.remember(&largest[range]).map_err(|error| error.because(pairs::of_pair(spec)))?;
         }
+        Ok(())
     }
 
     /// Begin another run with the bodies of this problem: its counters start at zero.

@@ -441,7 +441,7 @@ fn look_away<const D: usize>(a: &Side<D>, b: &Side<D>, common: &Intersection<D>)
 
 /// Return the reason that names the pair in an error at an expression. The table of the expression may be for many
 /// pairs.
-fn of_pair(spec: &ContactSpec) -> String {
+pub fn of_pair(spec: &ContactSpec) -> String {
     let [a, b] = spec.between.each_ref().map(|name| &name.value);
     format!("it is for the contact of `{a}` and `{b}`")
 }

@@ -168,7 +168,7 @@ pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clo
     let _stage = session.stage("set-up");
     let scene = built.scene.clone();
     let Begin { start, steps, largest } = begin;
-    built.discrete.remember(&largest);
+    built.discrete.remember(&largest)?;
     for (i, pair) in steps.last().iter().flat_map(|step| step.pairs.iter().enumerate()) {
         if scene.method.steps.locks(steps.len(), &built.discrete.specs[i]) {
             built.discrete.lock(i, pair.offset.unwrap_or(0.0));

@@ -55,8 +55,9 @@ fn loading_and_unloading_by_hand() {
 
 /// A wave is crushed by a pressure of 80, so that its points have compressions of their own.
 fn wave(steps: &str) -> Vec<String> {
-    let unload = "contact.0.unload={linear={stiffness=1e6}}".to_owned();
-    vec![unload, format!("method={{steps={steps},stop={{residual=1e-12}}}}")]
+    let layer = "contact.0.layer={power={B=2.5e-5,a=0.5}}".to_owned();
+    let unload = "contact.0.unload={linear={stiffness=1e7}}".to_owned();
+    vec![layer, unload, format!("method={{steps={steps},stop={{residual=1e-12}}}}")]
 }
 
 /// The second loading of a crushed wave goes along the first unloading, up to the largest load, and from there along the law.

@@ -143,12 +143,6 @@ pub struct Breach {
     pub is_finite: bool,
 }
 
-/// Return the compressions up to `top` at which laws are checked.
-pub fn samples(top: f64) -> impl Iterator<Item = f64> {
-    let share = |step: i32| pow(10.0, f64::from(step) / f64::from(STEPS) - f64::from(DECADES));
-    (0..=DECADES * STEPS).map(move |step| top * share(step))
-}
-
 /// Check that a pressure increases from `first` = p(0) up to the compression `top`, and return the largest compression
 /// that was checked. It is smaller than `top` if the pressure exceeds [`HUGE`] before. `value` gives p and p'.
 ///
@@ -157,10 +151,11 @@ pub fn samples(top: f64) -> impl Iterator<Item = f64> {
 pub fn increases(first: f64, top: f64, value: impl Fn(f64) -> (f64, f64)) -> Result<f64, Breach> {
     let least = value(top * 10f64.powi(-DECADES)).0;
     let (mut last, mut below) = (0.0, first.min(least - f64::MIN_POSITIVE));
-    for c in samples(top) {
+    for step in 0..=DECADES * STEPS {
         if below > HUGE {
             break;
         }
+        let c = top * pow(10.0, f64::from(step) / f64::from(STEPS) - f64::from(DECADES));
         let (pressure, slope) = value(c);
         let is_finite = pressure.is_finite() && slope.is_finite();
         if !is_finite {

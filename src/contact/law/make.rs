@@ -23,28 +23,21 @@ pub fn of_pair(spec: &ContactSpec, laws: &OwnLaws, position: &[[f64; 3]]) -> Res
         None => Some(compression.clone()),
         Some(tension) => Some(make(tension, laws, position)?),
     };
-    let unloading = spec.unload.as_ref().map(|unload| unloading(unload, &compression, laws, position)).transpose()?;
+    let unloading = spec.unload.as_ref().map(|unload| unloading(unload, laws, position)).transpose()?;
     Ok(Law { compression, tension, unloading })
 }
 
-/// Return how a layer with the law `loading` is unloaded.
+/// Return how a layer is unloaded.
 ///
 /// # Errors
-/// See [`make`]; and unloading that is softer than loading.
-fn unloading(
-    spec: &UnloadSpec,
-    loading: &Rc<dyn LayerLaw>,
-    laws: &OwnLaws,
-    position: &[[f64; 3]],
-) -> Result<Unloading> {
-    let unloading = match spec {
+/// See [`make`].
+fn unloading(spec: &UnloadSpec, laws: &OwnLaws, position: &[[f64; 3]]) -> Result<Unloading> {
+    Ok(match spec {
         UnloadSpec::Law(law) => Unloading::Law(make(law, laws, position)?),
         UnloadSpec::Slopes(rows) => {
             Unloading::Slopes(rows.iter().map(|[_, pressure, slope]| [*pressure, *slope]).collect())
         }
-    };
-    (0..position.len()).try_for_each(|point| unloading.check(&**loading, point, extent(position)))?;
-    Ok(unloading)
+    })
 }
 
 /// Make the law of a layer at the contact points `position`. `laws` are the laws that the program brings, by name.

@@ -8,9 +8,8 @@
 //!
 //! and beyond m it is that of the law. It increases, so that each load step is a convex problem like any other. The
 //! pressure ends at c = m - x with q(x) = p_m, which is how far the layer stays compressed without pressure. That is
-//! 0 or more if q is nowhere softer than the law: q(m) >= p_m.
+//! 0 or more if q(m) >= p_m; softer unloading is refused.
 
-use super::expression::samples;
 use super::forms::Power;
 use super::{Law, LayerLaw, PerPoint, extended};
 use crate::error::{Error, Kind, Result};
@@ -49,30 +48,6 @@ impl Unloading {
             }
         }
     }
-
-    /// Check at a contact point that unloading is nowhere softer than `loading`, for compressions up to `size`.
-    ///
-    /// # Errors
-    /// It is softer at some compression.
-    pub fn check(&self, loading: &dyn LayerLaw, point: usize, size: f64) -> Result<()> {
-        for c in samples(size.min(loading.end(point))) {
-            let (pressure, _) = loading.pressure_and_tangent(point, c);
-            let fallen = match self {
-                Self::Law(law) => extended(&**law, point, c).0,
-                Self::Slopes(points) => Self::slope(points, pressure) * c,
-            };
-            if fallen < pressure * (1.0 - SAME) {
-                let [c, fallen, pressure] = [c, fallen, pressure].map(|value| format!("{value:.3e}"));
-                let message = format!(
-                    "`unload` is softer than the layer: on the way back from c = {c} the pressure falls by {fallen} of {pressure}"
-                );
-                return Err(Error::new(Kind::Scene, message)
-                    .because("a layer cannot press where it is open")
-                    .help("unload by a law that is at least as stiff as that of the layer, at every compression"));
-            }
-        }
-        Ok(())
-    }
 }
 
 /// Share of a pressure by which rounding may make a law of unloading softer that is the law of the layer.
@@ -100,16 +75,26 @@ struct PointMemory {
 
 impl Memory {
     /// Return the law after its points have had compressions up to `largest`.
-    pub fn new(loading: Rc<dyn LayerLaw>, unloading: &Unloading, largest: &[f64]) -> Self {
+    ///
+    /// # Errors
+    /// Unloading is so soft that there would be pressure left where the layer opens.
+    pub fn new(loading: Rc<dyn LayerLaw>, unloading: &Unloading, largest: &[f64]) -> Result<Self> {
         let pressure = |(point, &m): (usize, &f64)| if m > 0.0 { extended(&*loading, point, m).0 } else { 0.0 };
         let pressures: Vec<f64> = largest.iter().enumerate().map(pressure).collect();
         let unloading = unloading.at(&pressures);
         let memory = |(point, (&largest, &pressure)): (usize, (&f64, &f64))| {
-            let fall = || unloading.compression(point, pressure).min(largest);
-            (largest > 0.0).then(|| PointMemory { largest, pressure, fall: fall() })
+            if largest <= 0.0 {
+                return Ok(None);
+            }
+            let fallen = unloading.pressure(point, largest);
+            if fallen < pressure * (1.0 - SAME) {
+                return Err(too_soft(largest, pressure, fallen));
+            }
+            let fall = unloading.compression(point, pressure).min(largest);
+            Ok(Some(PointMemory { largest, pressure, fall }))
         };
-        let points = largest.iter().zip(&pressures).enumerate().map(memory).collect();
-        Self { loading, unloading, points }
+        let points = largest.iter().zip(&pressures).enumerate().map(memory).collect::<Result<_>>()?;
+        Ok(Self { loading, unloading, points })
     }
 
     /// Return the energy of a layer that was unloaded by `back` from its largest compression.
@@ -118,6 +103,17 @@ impl Memory {
         let fallen = |x: f64| self.unloading.energy(point, x);
         if back < fall { pressure * (fall - back) - (fallen(fall) - fallen(back)) } else { 0.0 }
     }
+}
+
+/// Return the error of unloading that takes away less than all of a pressure.
+fn too_soft(largest: f64, pressure: f64, fallen: f64) -> Error {
+    let [largest, pressure, fallen] = [largest, pressure, fallen].map(|value| format!("{value:.3e}"));
+    let message = format!(
+        "`unload` is softer than the layer: on the way back from c = {largest} the pressure falls by {fallen} of {pressure}"
+    );
+    Error::new(Kind::Scene, message)
+        .because("a layer cannot press where it is open")
+        .help("unload by a law that takes away the whole pressure within the compression, such as a stiffer one")
 }
 
 impl LayerLaw for Memory {

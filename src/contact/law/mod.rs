@@ -21,6 +21,7 @@ mod table;
 #[cfg(test)]
 mod tests;
 
+use crate::error::Result;
 pub use forms::Power;
 pub use make::{LawMaker, OwnLaws, make, of_pair};
 use memory::{Memory, Unloading};
@@ -115,11 +116,15 @@ impl Law {
         self.unloading.is_some()
     }
 
-    /// Let the points of the law have had compressions up to `largest`, of which those up to 0 count as none.
-    pub fn remember(&mut self, largest: &[f64]) {
+    /// Let the points of the law have had compressions up to `largest`; those up to 0 count as none.
+    ///
+    /// # Errors
+    /// The law of unloading is too soft.
+    pub fn remember(&mut self, largest: &[f64]) -> Result<()> {
         if let Some(unloading) = &self.unloading {
-            self.compression = Rc::new(Memory::new(self.compression.clone(), unloading, largest));
+            self.compression = Rc::new(Memory::new(self.compression.clone(), unloading, largest)?);
         }
+        Ok(())
     }
 
     /// Return the compression up to which there is no pressure: 0, or more where a layer stays compressed.
