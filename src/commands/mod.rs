@@ -97,7 +97,7 @@ impl Terminal {
             ));
         }
         for chosen in built.options.iter().take(LISTED) {
-            lines.push(format!("  PETSc options of {}: {}", chosen.prefix(), chosen.in_words()));
+            lines.push(format!("  PETSc options of {}: {}", chosen.name(), chosen.in_words()));
         }
         Ok(if self.is_first { lines } else { Vec::new() })
     }

@@ -57,6 +57,7 @@ impl<'a> SolverFactory<'a> {
         if session.size() > 1 {
             session.world().all_reduce_into(&mine, &mut least, SystemOperation::min());
         }
+        session.options().clear_defaults();
         let typed = UserOptions::read(session);
         let asked = SolverRequest {
             preset: scene.solver.preset,
@@ -177,7 +178,7 @@ impl<'a> SolverFactory<'a> {
         for chosen in chosen.into_iter().filter(|chosen| chosen.get("ksp_type") == Some("preonly")) {
             let pc = chosen.get("pc_type").unwrap_or_default();
             if !matches!(pc, "cholesky" | "lu") {
-                kinds.entry(pc).or_default().push(chosen.prefix().to_owned());
+                kinds.entry(pc).or_default().push(chosen.name().to_owned());
             }
         }
         let warning = |(pc, names): (&str, Vec<String>)| {

@@ -165,18 +165,16 @@ fn a_missing_options_file_is_reported_in_petscs_words() {
 #[test]
 fn an_option_read_on_one_rank_is_read() {
     expect_success(alone("parallel::petsc::an_option_read_on_one_rank_is_read", 2, &[], || {
-        let line = "-ksp_type cg -lower_ksp_rtol 1e-3 -upper_ksp_rtol 1e-9 -upper_ksp_rtoll 1e-9 -pc_sor_its 2 -newton_ksp_rtol 1";
+        let line = "-lower_ksp_rtol 1e-3 -upper_ksp_rtol 1e-9 -upper_ksp_rtoll 1e-9 -pc_sor_its 2 -newton_ksp_rtol 1";
         let session = Session::start(&words(line))?;
         let bodies = ["upper", "lower"];
         // Each rank has one body, and tells PETSc only what concerns that.
         let body = bodies[session.rank()];
-        let mut chosen = UserOptions::read(&session).of(body);
-        chosen.set_default("pc_type", "jacobi");
+        let chosen = UserOptions::read(&session).of(body);
         let matrix = chain(&session, 9)?;
-        let group = chosen.group(&session)?;
-        let ksp = solver(&session, &format!("{}_", group.prefix), &matrix)?;
+        let ksp = solver(&session, chosen.prefix(), &matrix)?;
         ksp.set_up()?;
-        let error = unread(&session, &bodies).expect_err("a typing mistake");
+        let error = unread(&session, &bodies, &[chosen.clone()]).expect_err("a typing mistake");
         assert!(error.message().ends_with("the option -upper_ksp_rtoll"), "{error}");
         assert_eq!(error.advice(), Some("did you mean -upper_ksp_rtol?"));
         session.options().clear("-upper_ksp_rtoll")?;
@@ -185,11 +183,9 @@ fn an_option_read_on_one_rank_is_read() {
             session.options().clear(name)?;
             session.options().set(name, Some("2"))?;
         }
-        let warnings = unread(&session, &bodies)?;
+        let warnings = unread(&session, &bodies, &[chosen.clone()])?;
         assert!(warnings.len() == 2 && warnings.iter().all(|text| text.contains("was not used")), "{warnings:?}");
         assert!(warnings[0].contains("-newton_ksp_rtol") && warnings[1].contains("-pc_sor_its"), "{warnings:?}");
-        // a group leaves the table with its last solver
-        drop((ksp, group));
         assert_eq!(session.options().left()?, []);
         Ok(())
     }));
