@@ -145,7 +145,7 @@ fn options_come_from_line_file_and_environment() {
         for (name, value) in [("ksp_type", "cg"), ("pc_type", "sor"), ("ksp_rtol", "1e-3"), ("ksp_max_it", "7")] {
             assert_eq!(upper.typed(name), Some(value));
         }
-        let error = unread(&session, &["upper"]).expect_err("PETSc has no -shift");
+        let error = unread(&session, &["upper"], &[]).expect_err("PETSc has no -shift");
         assert!(error.message().ends_with("the option -shift"), "{error}");
         Ok(())
     }));
