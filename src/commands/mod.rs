@@ -6,7 +6,6 @@ pub(crate) mod bench;
 mod cases;
 pub(crate) mod check;
 pub mod checkpoint;
-mod interpolate;
 pub(crate) mod mesh;
 pub(crate) mod new;
 mod plots;
@@ -14,7 +13,6 @@ mod rows;
 mod shortfall;
 pub(crate) mod solve;
 pub(crate) mod sweep;
-mod transfer;
 mod write;
 
 use crate::error::Result;

@@ -49,7 +49,7 @@ impl ResultFiles<'_> {
         let recovered = results::recover(done);
         let mut report = report::report(session, done, &recovered, clock);
         report.discretization_error = self.estimate.map(report::discretization_error);
-        report.rounds.clone_from(&self.plan.rounds);
+        report.rounds = self.plan.reports();
         change(&mut report);
         let shown = busiest(&report.pairs, output.pairs.unwrap_or(LISTED));
         report.left_out = left_out(&report.pairs, &shown);
