@@ -178,6 +178,10 @@ impl Ksp {
     /// assert!(session.options().used("-pc_gamg_threshold") && session.options().typed().len() == 1);
     /// session.options().clear_defaults();
     /// assert!(!session.options().has("-pc_gamg_threshold"));
+    /// iterative.set_default("pc_gamg_threshold", "0.1")?;
+    /// session.options().set("pc_gamg_threshold", Some("0.2"))?;
+    /// session.options().clear_defaults();
+    /// assert!(session.options().has("-pc_gamg_threshold")); // it is the user's now
     /// # Ok::<(), winkler::error::Error>(())
     /// ```
     ///

@@ -51,6 +51,7 @@ impl Options {
     /// is full.
     pub fn set(&self, name: &str, value: Option<&str>) -> Result<()> {
         self.put(name, value)?;
+        self.session.defaults().borrow_mut().retain(|default| !default.eq_ignore_ascii_case(&dashed(name)));
         self.session.typed().borrow_mut().insert(dashed(name), value.map(str::to_owned));
         Ok(())
     }
