@@ -23,7 +23,7 @@ mod msh2;
 mod scan;
 mod script;
 mod shape;
-pub mod simplex;
+mod simplex;
 mod split;
 #[cfg(test)]
 mod tests;

@@ -122,12 +122,6 @@ impl ElementType {
         types.into_iter().find(|kind| kind.1 == nodes).map_or(0, |kind| kind.0)
     }
 
-    /// Return Gmsh's number of the type with this shape and degree that has all nodes, also those inside faces and cells.
-    pub fn complete(shape: &Shape, degree: usize) -> i32 {
-        let types = TYPES.iter().rfind(|(own, _)| *own == shape).and_then(|(_, types)| types.get(degree - 1));
-        types.map_or(0, |kind| kind.0)
-    }
-
     /// Return whether the elements are no simplices and must be divided.
     pub fn is_divided(&self) -> bool {
         !self.shape.faces.is_empty()

@@ -1,6 +1,5 @@
 //! Meshes with fields at their points and cells, which `vtu.rs` writes for ParaView and `views.rs` for Gmsh.
 
-use crate::mesh::simplex::{self, ElementType};
 use serde::{Deserialize, Serialize};
 
 /// The kind of the cells of a body: simplices of a dimension (1 to 3) and an order, which is at most 2 in space.
@@ -28,8 +27,8 @@ impl CellKind {
 
     /// Return the dimension of the kind and its number in Gmsh.
     pub(super) fn gmsh(self) -> (i32, i32) {
-        let shape = [&simplex::LINE, &simplex::TRIANGLE, &simplex::TETRAHEDRON][self.dimension - 1];
-        (self.dimension as i32, ElementType::complete(shape, self.order))
+        const KINDS: [&[i32]; 3] = [&[1, 8, 26, 27, 28, 62, 63, 64], &[2, 9, 21, 23, 25, 42, 43, 44], &[4, 11]];
+        (self.dimension as i32, KINDS[self.dimension - 1][self.order - 1])
     }
 }
 

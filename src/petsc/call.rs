@@ -62,12 +62,14 @@ pub(super) fn start(words: &[String]) -> Result<()> {
     let initialize = || unsafe { ffi::PetscInitialize(count, arguments, null(), null()) };
     check("PetscInitialize", initialize)?;
     RUNS.set(true);
-    for name in OWN {
-        let name = text(name)?;
-        // SAFETY: the name lives until the end of the call.
-        unsafe { petsc!(PetscOptionsClearValue(null_mut(), name.as_ptr())) }?;
-    }
-    Ok(())
+    OWN.into_iter().try_for_each(clear_option)
+}
+
+/// Remove an option, by its name with the dash, from PETSc's table.
+pub(super) fn clear_option(name: &str) -> Result<()> {
+    let name = text(name)?;
+    // SAFETY: the name lives until the end of the call; null means PETSc's one table.
+    unsafe { petsc!(PetscOptionsClearValue(null_mut(), name.as_ptr())) }
 }
 
 /// End PETSc. It prints what options request for its end (-log_view).

@@ -1,7 +1,7 @@
 //! The table of PETSc's options, which all solvers of a process share, and the words with which PETSc's options begin.
 
 use super::Session;
-use super::call::{flag, is_set, petsc, string, text};
+use super::call::{clear_option, flag, is_set, petsc, string, text};
 use super::error::{Error, Result};
 use super::session::{Entry, left};
 use std::ffi::CString;
@@ -62,7 +62,8 @@ impl Options {
     /// When the name is not a valid name of an option.
     pub fn clear(&self, name: &str) -> Result<()> {
         self.session.typed().borrow_mut().remove(&dashed(name));
-        clear(name)
+        key(name)?;
+        clear_option(&dashed(name))
     }
 
     /// Set an option that the user has not typed, until all of these are [cleared](Self::clear_defaults).
@@ -115,13 +116,6 @@ impl Options {
     pub fn left(&self) -> Result<Vec<Entry>> {
         left()
     }
-}
-
-/// Remove an option from PETSc's table.
-pub(super) fn clear(name: &str) -> Result<()> {
-    let name = key(name)?;
-    // SAFETY: the text lives until the end of the call; null means PETSc's one table.
-    unsafe { petsc!(PetscOptionsClearValue(null_mut(), name.as_ptr())) }
 }
 
 fn dashed(name: &str) -> String {

@@ -4,7 +4,6 @@ use super::blas;
 use super::call::{self, petsc, string, text};
 use super::error::{Error, Result};
 use super::launch::{is_launched, with_quick_start};
-use super::options;
 use mpi::environment::Universe;
 use mpi::topology::{Communicator, SimpleCommunicator};
 use std::cell::RefCell;
@@ -201,7 +200,7 @@ impl Running {
     /// Remove the options that solvers got as defaults from PETSc's table.
     fn clear_defaults(&self) {
         // PETSc removes every option that it has taken before
-        self.defaults.take().iter().for_each(|name| drop(options::clear(name)));
+        self.defaults.take().iter().for_each(|name| drop(call::clear_option(name)));
     }
 
     /// End PETSc, if it runs.

@@ -333,7 +333,7 @@ fn a_solver_without_iterations_is_refused() {
         ("--method newton-robin --set solver=hypre -ksp_max_it -1", "-ksp_max_it is -1"),
         ("--set solver=icc -ksp_max_it 0", "-ksp_max_it is 0"),
         ("-ksp_type gmres -pc_type jacobi -ksp_max_it 0", "-ksp_max_it is 0"),
-        ("-pc_type gamg -upper_ksp_max_it 0", "-upper_ksp_max_it is 0"),
+        ("-upper_pc_type gamg -upper_ksp_max_it 0", "-upper_ksp_max_it is 0"),
         ("-pc_type gamg -pc_gamg_esteig_ksp_max_it 0", "-pc_gamg_esteig_ksp_max_it is 0"),
     ] {
         let run = groove(options);
