@@ -170,11 +170,11 @@ fn an_option_read_on_one_rank_is_read() {
         let bodies = ["upper", "lower"];
         // Each rank has one body, and tells PETSc only what concerns that.
         let body = bodies[session.rank()];
-        let chosen = UserOptions::read(&session).of(body);
+        let solvers = [UserOptions::read(&session).of(body)];
         let matrix = chain(&session, 9)?;
-        let ksp = solver(&session, chosen.prefix(), &matrix)?;
+        let ksp = solver(&session, solvers[0].prefix(), &matrix)?;
         ksp.set_up()?;
-        let error = unread(&session, &bodies, &[chosen.clone()]).expect_err("a typing mistake");
+        let error = unread(&session, &bodies, &solvers).expect_err("a typing mistake");
         assert!(error.message().ends_with("the option -upper_ksp_rtoll"), "{error}");
         assert_eq!(error.advice(), Some("did you mean -upper_ksp_rtol?"));
         session.options().clear("-upper_ksp_rtoll")?;
@@ -183,7 +183,7 @@ fn an_option_read_on_one_rank_is_read() {
             session.options().clear(name)?;
             session.options().set(name, Some("2"))?;
         }
-        let warnings = unread(&session, &bodies, &[chosen.clone()])?;
+        let warnings = unread(&session, &bodies, &solvers)?;
         assert!(warnings.len() == 2 && warnings.iter().all(|text| text.contains("was not used")), "{warnings:?}");
         assert!(warnings[0].contains("-newton_ksp_rtol") && warnings[1].contains("-pc_sor_its"), "{warnings:?}");
         assert_eq!(session.options().left()?, []);
