@@ -61,6 +61,9 @@ fn read_as<const D: usize>(name: &str, bytes: &[u8]) {
     }
 }
 
+/// Where a piece begins, its length, and the word in its place.
+type Change = (Index, usize, &'static str);
+
 #[test]
 fn damaged_files_never_end_the_program() {
     SEEDS.iter().for_each(|(name, seed)| read_any(name, seed));
@@ -68,7 +71,7 @@ fn damaged_files_never_end_the_program() {
     let changes = (select(&SEEDS[..]), proptest::collection::vec(change, 1..4));
     let config =
         Config { cases: 2000, rng_seed: RngSeed::Fixed(1211_7151), failure_persistence: None, ..Config::default() };
-    let test = |((name, seed), changes): ((&str, &[u8]), Vec<(Index, usize, &str)>)| {
+    let test = |((name, seed), changes): ((&str, &[u8]), Vec<Change>)| {
         let mut bytes = seed.to_vec();
         for (start, length, word) in changes {
             let start = start.index(bytes.len());
