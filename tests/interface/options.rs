@@ -30,6 +30,11 @@ fn options_reach_all_bodies_or_one() {
         ("-pc_type lu -pc_factor_mat_solver_type petsc", ["preonly + lu by petsc"; 2]),
         ("-upper_pc_type cholesky", ["condensed to 32 dofs by mumps", "preonly + cholesky by mumps"]),
         ("-upper_ksp_type cg -lower_pc_type gamg", ["cg + gamg", "cg + cholesky by mumps"]),
+        // what the program chooses for one body does not reach another one
+        (
+            "--method robin --set solver=hypre --set body.0.order=1 --set body.1.order=2 -mg_levels_ksp_max_it 2",
+            ["cg + hypre", "cg + mg by hypre"],
+        ),
         // a body with options of its own has these alone
         ("-ksp_type fcg -pc_type hypre -upper_pc_type jacobi", ["fcg + hypre", "cg + jacobi"]),
         ("-ksp_type fcg -pc_type hypre -lower_ksp_type gmres", ["gmres + cholesky by mumps", "fcg + hypre"]),
