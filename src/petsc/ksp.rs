@@ -176,11 +176,11 @@ impl Ksp {
     /// assert_eq!((direct.ksp_type(), direct.factor_package()), ("preonly".into(), Some("mumps".into())));
     /// assert_eq!((iterative.pc_type(), iterative.tolerance()), ("gamg".into(), 1e-3));
     /// assert!(session.options().used("-pc_gamg_threshold") && session.options().typed().len() == 1);
-    /// session.options().clear_defaults();
+    /// session.clear_defaults();
     /// assert!(!session.options().has("-pc_gamg_threshold"));
     /// iterative.set_default("pc_gamg_threshold", "0.1")?;
     /// session.options().set("pc_gamg_threshold", Some("0.2"))?;
-    /// session.options().clear_defaults();
+    /// session.clear_defaults();
     /// assert!(session.options().has("-pc_gamg_threshold")); // it is the user's now
     /// # Ok::<(), winkler::error::Error>(())
     /// ```

@@ -66,16 +66,11 @@ impl Options {
         clear_option(&dashed(name))
     }
 
-    /// Set an option that the user has not typed, until all of these are [cleared](Self::clear_defaults).
+    /// Set an option that the user has not typed, until all of these are [cleared](Session::clear_defaults).
     pub(super) fn set_default(&self, name: &str, value: &str) -> Result<()> {
         self.put(name, Some(value))?;
         self.session.defaults().borrow_mut().push(dashed(name));
         Ok(())
-    }
-
-    /// Remove the options that solvers got as defaults ([`Ksp::set_default`](super::Ksp::set_default)).
-    pub fn clear_defaults(&self) {
-        self.session.clear_defaults();
     }
 
     /// Put an option into PETSc's table.

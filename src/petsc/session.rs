@@ -94,8 +94,9 @@ impl Session {
         &self.0.defaults
     }
 
-    /// Remove the options that solvers got as defaults from PETSc's table.
-    pub(super) fn clear_defaults(&self) {
+    /// Remove the options that solvers got as defaults ([`Ksp::set_default`](super::Ksp::set_default)) from PETSc's
+    /// table.
+    pub fn clear_defaults(&self) {
         self.0.clear_defaults();
     }
 

@@ -51,7 +51,7 @@ impl<'a> SolverFactory<'a> {
     /// Start from the free memory and the options that the user wrote. The problem before had the solvers `before`.
     /// Collective.
     pub fn new(session: &'a Session, scene: &Scene, before: Option<(Solvers, Box<dyn LinearStep>)>) -> Result<Self> {
-        session.options().clear_defaults();
+        session.clear_defaults();
         let typed = UserOptions::read(session);
         let asked = SolverRequest {
             preset: scene.solver.preset,
