@@ -236,14 +236,9 @@ fn refuse_odd_files(words: &[String]) -> Result<()> {
     Ok(())
 }
 
-/// Run a command that solves, in a session with PETSc. `check` starts MPI and PETSc only if something needs them.
+/// Run a command that solves, in a session with PETSc.
 fn with_session(petsc: &[String], interrupt: &Interrupt, command: Solving) -> i32 {
-    let is_lone = petsc.is_empty() && std::env::var_os("PETSC_OPTIONS").is_none() && !Session::is_one_of_several();
-    let session = match command {
-        Solving::Check(_) if is_lone => Session::alone().map_err(Error::from),
-        _ => refuse_odd_files(petsc).and_then(|()| Ok(Session::start(petsc)?)),
-    };
-    let session = match session {
+    let session = match refuse_odd_files(petsc).and_then(|()| Ok(Session::start(petsc)?)) {
         Ok(session) => session,
         Err(error) => return complain(&error),
     };
@@ -265,7 +260,7 @@ fn with_session(petsc: &[String], interrupt: &Interrupt, command: Solving) -> i3
     }
 }
 
-/// Run a command that solves, in a session with PETSc.
+/// Run a command in its session.
 fn dispatch(session: &Session, interrupt: &Interrupt, command: Solving) -> Result<i32> {
     match command {
         Solving::Solve(request) => solve::solve(session, interrupt, &request),

@@ -8,8 +8,10 @@
 
 mod force;
 mod held;
+pub mod interpolate;
 mod pressure;
 pub mod sizes;
+pub mod transfer;
 
 use crate::ddm::respond;
 use crate::discretize::meshes::{KeptMeshes, Meshes, RecoveredBody, in_dimension};

@@ -63,15 +63,6 @@ pub fn kind_of(kind: FileType) -> &'static str {
     }
 }
 
-/// Return the bytes of a text with the line ends of Unix, if it has those of old Macs, carriage returns alone. Other
-/// texts are unchanged, so that every line keeps its number.
-pub fn with_unix_lines(mut bytes: Vec<u8>) -> Vec<u8> {
-    if bytes.contains(&b'\r') && !bytes.contains(&b'\n') {
-        bytes.iter_mut().filter(|byte| **byte == b'\r').for_each(|byte| *byte = b'\n');
-    }
-    bytes
-}
-
 /// Return why bytes are no UTF-8 text, as the rest of a sentence about their file; none if nothing is obviously wrong.
 pub fn other_encoding(bytes: &[u8]) -> Option<&'static str> {
     match bytes {
@@ -153,10 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_of_old_macs_are_lines() {
-        let unix = |text: &[u8]| with_unix_lines(text.to_vec());
-        assert_eq!(unix(b"a\rb\r"), b"a\nb\n");
-        assert_eq!(unix(b"a\r\nb\rc"), b"a\r\nb\rc");
+    fn other_encodings_are_found() {
         assert_eq!(other_encoding(b"\xff\xfea\0"), Some("is UTF-16 text, not UTF-8"));
         assert_eq!(other_encoding(b"a"), None);
         assert!(other_encoding(b"a\0").is_some());

@@ -119,6 +119,15 @@ pub fn owners(loads: &[usize], ranks: usize) -> Vec<usize> {
     owner
 }
 
+/// Return the least number of all ranks. Collective.
+pub fn least(session: &Session, mine: u64) -> u64 {
+    let mut least = mine;
+    if session.size() > 1 {
+        session.world().all_reduce_into(&mine, &mut least, SystemOperation::min());
+    }
+    least
+}
+
 /// Make the results of all ranks agree: if one rank failed, all fail, with the error of the lowest rank that has a
 /// message. The other ranks get an error of the same kind without a message, which is not printed. Collective.
 ///
@@ -132,8 +141,7 @@ pub fn collectively<T>(session: &Session, result: Result<T>) -> Result<T> {
     let told = result.as_ref().err().filter(|error| !error.is_silent());
     // the rank in the upper half: the least number is that of the first rank with a message
     let mine = told.map_or(u64::MAX, |error| (session.rank() as u64) << 32 | error.kind().exit_code() as u64);
-    let mut least = mine;
-    session.world().all_reduce_into(&mine, &mut least, SystemOperation::min());
+    let least = least(session, mine);
     match result {
         _ if least == u64::MAX => result,
         Err(error) if mine == least => Err(error.agreed()),

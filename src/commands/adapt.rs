@@ -3,12 +3,12 @@
 
 use super::checkpoint::{Checkpoint, CheckpointHeader};
 use super::shortfall::Shortfall;
-use super::transfer::{self, EstimatedSolution};
 use crate::ddm::{InitialGuess, Solution, Status};
 use crate::discretize::meshes::Meshes;
 use crate::error::{Error, Kind, Result};
 use crate::estimate::Estimate;
 use crate::estimate::sizes::{self, Aim, Sizes};
+use crate::estimate::transfer::{self, EstimatedSolution};
 use crate::interrupt::Interrupt;
 use crate::mesh;
 use crate::output::{ContactTable, RoundReport, UnmetReport};
@@ -36,8 +36,7 @@ const LEAST: f64 = 0.1;
 
 /// Least ratio of the cells of a mesh to those of the mesh before. All meshes before the last one then cost no more
 /// than that one together. Gmsh makes about 0.6 of the predicted cells in space, so that the prediction is corrected by
-/// what it made of the last one: a T-slot nut of linear elements takes four meshes to 2e-2, and nine without the
-/// correction.
+/// what it made of the last one, which saves half of the meshes.
 ///
 /// Meshes with fewer cells do not have the predicted errors where these fall more slowly than h^p, at edges of
 /// supports, loads and contact.
@@ -59,12 +58,10 @@ struct Pace {
 }
 
 /// Power of the energy error with which pressures converge where elements have an order above two and meshes are graded
-/// to singular places. `groove-held` of orders 4 and 6 under layers with a = 1, 0.5 and 0.3 takes 165 000 dofs to 1e-6,
-/// all meshes of the six runs together. With powers of 1.2, 1.6 and 2 it takes 1.30, 1.26 and 1.55 times as many.
+/// to singular places. With 1.2 or 1.6 `groove-held` of orders 4 and 6 takes a quarter more dofs to 1e-6.
 const NODAL: f64 = 1.4;
 
-/// The same as [`LEAST`] for orders above two. With 0.01, 0.05 and 0.1 the same runs take 1.11, 1.23 and 1.38 times the
-/// dofs.
+/// The same as [`LEAST`] for orders above two. With 0.01 or 0.05 the same runs take a tenth or a quarter more dofs.
 const STEEPEST: f64 = 0.02;
 
 impl Pace {
@@ -83,8 +80,8 @@ impl Pace {
 /// The state of a run on several meshes. A round is one mesh, with the solution on it.
 pub struct AdaptiveRun {
     pub scene: Rc<Scene>,
-    /// Reports of the rounds so far.
-    pub rounds: Vec<RoundReport>,
+    /// The rounds that have ended.
+    rounds: Vec<Round>,
     /// Why the run ends before the error is reached.
     pub shortfall: Option<Shortfall>,
     /// The errors of pairs on the last mesh that are above the one asked for.
@@ -95,35 +92,29 @@ pub struct AdaptiveRun {
     resumed: Option<Checkpoint>,
     /// The scene as it was requested.
     pub requested: Rc<Scene>,
-    /// The solution that the next round starts from; empty without one.
-    start_from: Vec<ContactTable>,
-    /// Seconds from the begin of the run to the end of the round before.
-    seconds: f64,
-    /// The solution of the round before with its estimated errors.
-    previous: Option<EstimatedSolution>,
-    /// The error at sharp ends on the mesh before.
-    last_end: Option<MeshError>,
-    /// What was asked of the mesh of the round before.
-    last_mesh: Option<Arc<AdaptedMesh>>,
     /// Number of cells that was predicted for this round from its sizes.
     predicted_cells: Option<f64>,
     /// The load steps that follow on the last mesh, while meshes are adapted under the largest of them.
     later_steps: Option<History>,
 }
 
-/// An error on a mesh with this number of cells.
-#[derive(Clone, Copy)]
-struct MeshError {
-    cells: f64,
-    error: f64,
+/// A round that has ended.
+struct Round {
+    report: RoundReport,
+    /// What was asked of its mesh; none without adaptation, or before a checkpoint.
+    mesh: Option<Arc<AdaptedMesh>>,
+    /// Its solution on the contact surfaces with the estimated errors, if there is one.
+    solution: Option<EstimatedSolution>,
+    /// The error at sharp ends of contacts.
+    end: Option<f64>,
+    /// Seconds from the begin of the run to its end.
+    ended: f64,
 }
 
-impl MeshError {
-    /// Return the number of cells of a mesh whose error is `asked`, if it goes on falling with the number of cells as
-    /// it did since the mesh `before`.
-    fn cells_for(&self, before: MeshError, asked: f64) -> f64 {
-        let rate = (before.error / self.error).ln() / (self.cells / before.cells).ln();
-        if rate > 0.0 { self.cells * (self.error / asked).powf(1.0 / rate) } else { f64::INFINITY }
+impl Round {
+    /// Return the round of a report from a checkpoint.
+    fn before(report: RoundReport) -> Self {
+        Self { report, mesh: None, solution: None, end: None, ended: 0.0 }
     }
 }
 
@@ -172,15 +163,10 @@ impl AdaptiveRun {
             goal: scene.adapt.clone(),
             requested: scene.clone(),
             scene,
-            rounds: head.rounds,
+            rounds: head.rounds.into_iter().map(Round::before).collect(),
             resumed,
             shortfall: head.shortfall,
             unmet: head.unmet,
-            last_end: None,
-            start_from: Vec::new(),
-            seconds: 0.0,
-            previous: None,
-            last_mesh: None,
             predicted_cells: None,
             later_steps: None,
         }
@@ -227,8 +213,6 @@ impl AdaptiveRun {
     /// End the adaptation on the mesh that the scene follows. Return whether another round makes all load steps on it.
     fn end_meshes(&mut self) -> bool {
         let Some(steps) = self.later_steps.take() else { return false };
-        // the first step has another load than the largest one, so that it finds its own start
-        self.start_from.clear();
         Rc::make_mut(&mut self.scene).method.steps = steps;
         true
     }
@@ -248,16 +232,26 @@ impl AdaptiveRun {
     /// What [`run::build`] refuses, but not the mesh of a later round.
     pub fn build(&mut self, session: &Session, interrupt: &Interrupt, clock: &mut Clock) -> Result<Built> {
         match run::build(session, self.scene.clone(), interrupt, clock) {
-            Err(error) if error.kind() == Kind::Mesh && self.last_mesh.is_some() && self.shortfall.is_none() => {
-                let round = self.rounds.len();
+            Err(error) if error.kind() == Kind::Mesh && self.last_mesh().is_some() && self.shortfall.is_none() => {
+                let (round, last) = (self.rounds.len(), self.last_mesh());
                 let reason = format!("no mesh comes of the sizes after mesh {round}: {}", error.message());
                 self.shortfall = Some(Shortfall::Limit(reason));
-                follow(Rc::make_mut(&mut self.scene), self.last_mesh.take());
+                follow(Rc::make_mut(&mut self.scene), last);
                 self.end_meshes();
                 run::build(session, self.scene.clone(), interrupt, clock)
             }
             built => built,
         }
+    }
+
+    /// Return what was asked of the mesh of the round before.
+    fn last_mesh(&self) -> Option<Arc<AdaptedMesh>> {
+        self.rounds.last()?.mesh.clone()
+    }
+
+    /// Return the reports of the rounds so far.
+    pub fn reports(&self) -> Vec<RoundReport> {
+        self.rounds.iter().map(|round| round.report.clone()).collect()
     }
 
     /// Return where this round begins: where a checkpoint or an earlier round ended.
@@ -271,7 +265,7 @@ impl AdaptiveRun {
     /// Return the head of a checkpoint of this round.
     pub fn head(&self) -> CheckpointHeader {
         CheckpointHeader {
-            rounds: self.rounds.clone(),
+            rounds: self.reports(),
             adapted: self.adapted().map(|adapted| (*adapted).clone()),
             on_last_mesh: self.is_stepping(),
             shortfall: self.shortfall.clone(),
@@ -280,54 +274,78 @@ impl AdaptiveRun {
         }
     }
 
-    /// Return the start of this round, if an earlier round gives it: `flange` to 5e-2 takes 10 steps on its four
-    /// meshes, and 18 with automatic starts.
+    /// Return the start of this round, if the round before gives it. It takes about half of the steps of an automatic
+    /// start. The first load step has another load than the mesh before, so that it finds its own start.
     fn start(&self, built: &Built) -> Option<InitialGuess> {
+        let tables = self.rounds.last()?.solution.as_ref().filter(|_| !self.is_stepping())?.tables();
         let Built { scene, discrete, .. } = built;
-        let newton = matches!(scene.method.name, MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin);
-        (!self.start_from.is_empty()).then(|| {
-            if newton {
-                let compression = discrete.model.compressions_of(&transfer::pressure(&self.start_from, discrete));
-                InitialGuess::Known(Box::new(Solution { compression, ..Solution::default() }))
-            } else {
-                InitialGuess::Trace(transfer::trace(&self.start_from, discrete))
-            }
-        })
+        if matches!(scene.method.name, MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin) {
+            let compression = discrete.model.compressions_of(&transfer::pressure(tables, discrete));
+            Some(InitialGuess::Known(Box::new(Solution { compression, ..Solution::default() })))
+        } else {
+            Some(InitialGuess::Trace(transfer::trace(tables, discrete)))
+        }
     }
 
-    /// Make the plan of the next round. Return whether there is one.
+    /// End this round, and let the scene follow the mesh of the next one. Return whether there is a next round.
     pub fn advance(&mut self, done: &Done, estimate: Option<&Estimate>, clock: &mut Clock) -> bool {
         if matches!(done.outcome.status, Status::Interrupted { .. }) || self.is_stepping() {
             return false;
         }
         let (Some(goal), Some(estimate)) = (self.goal.clone(), estimate) else { return false };
-        self.record(done, estimate, clock);
+        self.rounds.push(self.round(done, estimate, clock));
         if !done.outcome.status.is_solved() || self.shortfall.is_some() {
             return false;
         }
-        let (asked, error) = (goal.error.value, estimate.largest(goal.of));
         self.unmet = unmet(done, estimate, &goal);
+        match self.next_mesh(done, estimate, &goal) {
+            Ok(Some(next)) => {
+                self.predicted_cells = Some(next.cells);
+                follow(Rc::make_mut(&mut self.scene), Some(mesh_of(&next).into()));
+                true
+            }
+            Ok(None) => self.end_meshes(),
+            Err(shortfall) => {
+                self.shortfall = Some(shortfall);
+                self.end_meshes()
+            }
+        }
+    }
+
+    /// Return the sizes of the next mesh, or none if the error is reached on the mesh of the last round.
+    ///
+    /// # Errors
+    /// Why no mesh reaches the error.
+    fn next_mesh(
+        &self,
+        done: &Done,
+        estimate: &Estimate,
+        goal: &AdaptSpec,
+    ) -> std::result::Result<Option<Sizes>, Shortfall> {
         // a second mesh checks a guess
-        let is_reached = error <= asked && !(self.rounds.len() == 1 && estimate.is_guess());
-        if is_reached || self.has_costly_ends(estimate, &goal) {
-            return self.end_meshes();
+        let is_checked = self.rounds.len() > 1 || !estimate.is_guess();
+        if estimate.largest(goal.of) <= goal.error.value && is_checked {
+            return Ok(None);
         }
+        if let Some(ends) = self.costly_ends(estimate, goal) {
+            return Err(Shortfall::SharpEnds(ends));
+        }
+        let limit = |reason: String| Err(Shortfall::Limit(reason));
         if self.rounds.len() >= goal.rounds {
-            let reason = format!("{} meshes were made: allow more (adapt.rounds)", goal.rounds);
-            self.shortfall = Some(Shortfall::Limit(reason));
-            return self.end_meshes();
+            return limit(format!("{} meshes were made: allow more (adapt.rounds)", goal.rounds));
         }
-        let Some(next) = self.next_sizes(done, estimate, &goal) else {
-            let RoundReport { cells, .. } = self.rounds[self.rounds.len() - 1];
-            let needed = format!("a mesh has {cells} cells, and the next one needs more than {}", goal.cells);
-            self.shortfall = Some(Shortfall::Limit(needed + ": allow more (adapt.cells)"));
-            return self.end_meshes();
-        };
-        self.start_from = contact_tables(done);
-        self.predicted_cells = Some(next.cells);
-        self.last_mesh = self.adapted();
-        follow(Rc::make_mut(&mut self.scene), Some(mesh_of(&next).into()));
-        true
+        let sizes = self.next_sizes(done, estimate, goal);
+        if sizes.is_none() {
+            let needed =
+                format!("a mesh has {} cells, and the next one needs more than {}", self.last_cells(), goal.cells);
+            return limit(needed + ": allow more (adapt.cells)");
+        }
+        Ok(sizes)
+    }
+
+    /// Return the number of cells of the last round.
+    fn last_cells(&self) -> usize {
+        self.rounds.last().map_or(0, |round| round.report.cells)
     }
 
     /// Return the sizes of the next mesh; none if it would have more cells than allowed.
@@ -335,7 +353,7 @@ impl AdaptiveRun {
         let (meshes, model) = (done.built.discrete.meshes.as_ref()?, done.model());
         let pace = self.pace();
         let share = (AIM * goal.error.value / estimate.largest(goal.of)).max(pace.least).powf(pace.power);
-        let cells = self.rounds[self.rounds.len() - 1].cells as f64;
+        let cells = self.last_cells() as f64;
         // a mesher does not make as many cells as its sizes predict: the mesh of this round gives the ratio
         let excess = self.predicted_cells.map_or(1.0, |predicted| predicted / cells);
         let most = goal.cells as f64 * excess;
@@ -347,24 +365,30 @@ impl AdaptiveRun {
         (!is_full).then_some(next)
     }
 
-    /// Return whether only sharp ends of contacts are left of an error, which meshes of a few times as many cells do
-    /// not reach there.
+    /// Return the number of cells of a mesh whose error is `asked`, if this goes on falling with the number of cells as
+    /// it did over the last `meshes`. It is infinite if the error does not fall, and none if an error is not known.
+    fn cells_for(&self, asked: f64, meshes: usize, error: impl Fn(&Round) -> Option<f64>) -> Option<f64> {
+        let at = |back: usize| {
+            let round = &self.rounds[self.rounds.len().checked_sub(back + 1)?];
+            Some((round.report.cells as f64, error(round).filter(|error| *error > 0.0)?))
+        };
+        let ((cells, error), (cells_before, error_before)) = (at(0)?, at(meshes)?);
+        let rate = (error_before / error).ln() / (cells / cells_before).ln();
+        Some(if rate > 0.0 { cells * (error / asked).powf(1.0 / rate) } else { f64::INFINITY })
+    }
+
+    /// Return why sharp ends of contacts, which alone are left of an error, do not reach it on meshes of a few times as
+    /// many cells; none if they may.
     ///
     /// Without a layer the pressure is K r^(lambda - 1) at the distance r from the end, and facets of size h miss the
     /// order h^(lambda - 1/2) of it. A punch with right angles has lambda = 0.774: a half of the error takes facets of
     /// a thirteenth.
-    fn has_costly_ends(&mut self, estimate: &Estimate, goal: &AdaptSpec) -> bool {
-        if !matches!(goal.of, Quantity::All | Quantity::Pressures) {
-            return false;
-        }
-        let (asked, error) = (goal.error.value, estimate.ends.iter().copied().fold(0.0, f64::max));
-        let cells = self.rounds[self.rounds.len() - 1].cells as f64;
-        let own = MeshError { cells, error };
-        let beside = estimate.largest_beside_ends(goal.of);
-        let Some(before) = self.last_end.replace(own).filter(|_| beside <= asked && error > 0.0) else { return false };
-        let needed = own.cells_for(before, asked);
-        if needed <= COSTLY * cells {
-            return false;
+    fn costly_ends(&self, estimate: &Estimate, goal: &AdaptSpec) -> Option<String> {
+        let (asked, beside) = (goal.error.value, estimate.largest_beside_ends(goal.of));
+        let needed = self.cells_for(asked, 1, |round| round.end)?;
+        let counts = matches!(goal.of, Quantity::All | Quantity::Pressures);
+        if !counts || beside > asked || needed <= COSTLY * self.last_cells() as f64 {
+            return None;
         }
         let meshes = if needed < 1e9 {
             format!("takes a mesh of about {needed:.0e} cells")
@@ -372,12 +396,11 @@ impl AdaptiveRun {
             "takes more cells than a mesh can have".to_owned()
         };
         let ends: Vec<String> = self.unmet.iter().map(UnmetReport::in_words).collect();
-        self.shortfall = Some(Shortfall::SharpEnds(format!(
+        Some(format!(
             "not to {asked:.1e} at sharp ends of contacts: {}; all other errors are {beside:.1e} at most, and {asked:.1e} there {meshes}; a rounded \
              edge or a softer layer bounds these pressures",
             ends.join(", ")
-        )));
-        true
+        ))
     }
 
     /// Return what the error asked for will take, as a line for the terminal, once three meshes show how the error
@@ -385,21 +408,15 @@ impl AdaptiveRun {
     /// cells.
     pub fn forecast(&self) -> Option<String> {
         let goal = self.goal.as_ref()?;
-        let [.., first, _, last] = &self.rounds[..] else { return None };
-        let error = |round: &RoundReport| MeshError {
-            cells: round.cells as f64,
-            error: match goal.of {
-                Quantity::All => round.pressure.max(round.displacement),
-                Quantity::Pressures => round.pressure,
-                Quantity::Displacements => round.displacement,
-                Quantity::Forces => round.force,
-            },
+        let (asked, last) = (goal.error.value, &self.rounds.last()?.report);
+        let error = |Round { report: RoundReport { pressure, displacement, force, .. }, .. }: &Round| match goal.of {
+            Quantity::All => pressure.max(*displacement),
+            Quantity::Pressures => *pressure,
+            Quantity::Displacements => *displacement,
+            Quantity::Forces => *force,
         };
-        let asked = goal.error.value;
-        let cells = error(last).cells_for(error(first), asked).max(GROWTH * last.cells as f64);
-        if !cells.is_finite() {
-            return None;
-        }
+        let needed = self.cells_for(asked, 2, |round| Some(error(round))).filter(|cells| cells.is_finite())?;
+        let cells = needed.max(GROWTH * last.cells as f64);
         let limit = if cells > goal.cells as f64 {
             format!(", more than adapt.cells = {} allows", goal.cells)
         } else {
@@ -408,9 +425,10 @@ impl AdaptiveRun {
         Some(format!("  an error of {asked:e} takes about {cells:.0e} cells{limit}"))
     }
 
-    fn record(&mut self, done: &Done, estimate: &Estimate, clock: &mut Clock) {
-        let (discrete, total) = (&done.built.discrete, clock.total());
-        self.rounds.push(RoundReport {
+    /// Return this round at its end.
+    fn round(&self, done: &Done, estimate: &Estimate, clock: &mut Clock) -> Round {
+        let (discrete, ended) = (&done.built.discrete, clock.total());
+        let report = RoundReport {
             cells: discrete.bodies.iter().map(|body| body.cells).sum(),
             dofs: discrete.bodies.iter().map(|body| body.dofs).sum(),
             pressure: estimate.largest(Quantity::Pressures),
@@ -418,9 +436,11 @@ impl AdaptiveRun {
             force: estimate.largest(Quantity::Forces),
             energy: estimate.energy,
             iterations: done.outcome.iterations,
-            seconds: total - self.seconds,
-        });
-        self.seconds = total;
+            seconds: ended - self.rounds.last().map_or(0.0, |round| round.ended),
+        };
+        let solution = done.outcome.status.is_solved().then(|| EstimatedSolution::new(estimate, contact_tables(done)));
+        let end = estimate.ends.iter().copied().fold(0.0, f64::max);
+        Round { report, mesh: self.adapted(), solution, end: Some(end), ended }
     }
 
     /// Return what was asked of the mesh of this round.
@@ -432,15 +452,12 @@ impl AdaptiveRun {
     }
 
     /// Increase the estimate of a mesh if the difference to the solution on the mesh before shows that it is too small.
-    pub fn correct(&mut self, done: &Done, estimate: &mut Estimate) {
-        if !self.adapts() || self.is_stepping() || !done.outcome.status.is_solved() {
-            return;
-        }
-        let tables = contact_tables(done);
-        let Some(meshes) = &done.built.discrete.meshes else { return };
+    pub fn correct(&self, done: &Done, estimate: &mut Estimate) {
+        let previous = self.rounds.last().and_then(|round| round.solution.as_ref());
+        let is_adapting = self.adapts() && !self.is_stepping() && done.outcome.status.is_solved();
+        let (Some(previous), Some(meshes), true) = (previous, &done.built.discrete.meshes, is_adapting) else { return };
         let edges: Vec<_> = (0..done.model().pairs.len()).map(|pair| meshes.points(pair).edges()).collect();
-        self.previous.iter().for_each(|previous| previous.correct(&tables, &edges, estimate));
-        self.previous = Some(EstimatedSolution::new(estimate, tables));
+        previous.correct(&contact_tables(done), &edges, estimate);
     }
 }
 

@@ -128,7 +128,7 @@ fn facts<const D: usize>(
     let Loaded { mesh, origin, file, notes, .. } = crate::mesh::load::<D>(source, &orders, interrupt)?;
     drop(line);
     let seconds = began.elapsed().as_secs_f64();
-    request.output.as_ref().map_or(Ok(()), |path| write(path, &file, D))?;
+    request.output.as_ref().map_or(Ok(()), |path| write::<D>(path, &file))?;
     let of_mesh = [in_parts(mesh.split), made_straight(mesh.straightened)];
     let mut facts = MeshFacts {
         title: request.scene.display().to_string(),
@@ -225,8 +225,8 @@ fn check_output(path: &Path, inputs: &[PathBuf]) -> Result<()> {
 }
 
 /// Write the mesh to another file.
-fn write(path: &Path, mesh: &Path, dimension: usize) -> Result<()> {
-    let bytes = crate::mesh::as_msh(mesh, dimension)?;
+fn write<const D: usize>(path: &Path, mesh: &Path) -> Result<()> {
+    let bytes = crate::mesh::as_msh::<D>(mesh)?;
     write_whole(path, |out| {
         out.write_all(&bytes)?;
         out.write_all(MARK_OF_MESH.as_bytes())

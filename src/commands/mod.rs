@@ -6,7 +6,6 @@ pub(crate) mod bench;
 mod cases;
 pub(crate) mod check;
 pub mod checkpoint;
-mod interpolate;
 pub(crate) mod mesh;
 pub(crate) mod new;
 mod plots;
@@ -14,7 +13,6 @@ mod rows;
 mod shortfall;
 pub(crate) mod solve;
 pub(crate) mod sweep;
-mod transfer;
 mod write;
 
 use crate::error::Result;
@@ -97,7 +95,7 @@ impl Terminal {
             ));
         }
         for chosen in built.options.iter().take(LISTED) {
-            lines.push(format!("  PETSc options of {}: {}", chosen.prefix(), chosen.in_words()));
+            lines.push(format!("  PETSc options of {}: {}", chosen.name(), chosen.in_words()));
         }
         Ok(if self.is_first { lines } else { Vec::new() })
     }

@@ -169,7 +169,7 @@ impl Solver<'_> {
     /// Print a line for each adapted mesh that has ended, and what the error asked for will take if another one
     /// follows.
     fn print_meshes(&mut self, goes_on: bool) -> Result<()> {
-        let rounds = &self.plan.rounds;
+        let rounds = self.plan.reports();
         if !self.terminal.is_loud() || rounds.is_empty() {
             return Ok(());
         }

@@ -47,7 +47,7 @@ impl ResultFiles<'_> {
         let is_first = session.rank() == 0;
         let recovered = results::recover(done);
         let mut report = report::report(session, done, &recovered, self.estimate, clock);
-        report.rounds.clone_from(&self.plan.rounds);
+        report.rounds = self.plan.reports();
         change(&mut report);
         let shown = busiest(report.results(), output.pairs.unwrap_or(LISTED));
         report.left_out = left_out(&report.pairs, &shown);

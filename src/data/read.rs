@@ -3,7 +3,7 @@
 
 use super::rule::DataSpec;
 use crate::error::{Error, Result};
-use crate::file::{other_encoding, with_unix_lines};
+use crate::file::other_encoding;
 use std::fmt::Display;
 
 /// Numbers in rows of one length.
@@ -27,7 +27,7 @@ pub fn rows(spec: &DataSpec) -> Result<NumberRows> {
     let bytes = crate::file::read(&spec.file).map_err(|error| error.at(&spec.file.place))?;
     let rows = match bytes.strip_prefix(b"\x93NUMPY") {
         Some(rest) => of_numpy(spec, rest)?,
-        None => of_text(spec, &with_unix_lines(bytes))?,
+        None => of_text(spec, &bytes)?,
     };
     match rows.values.iter().position(|value| !value.is_finite()) {
         Some(at) => {

@@ -4,11 +4,10 @@ use super::builder::MeshProducer;
 use super::cache::{self, Cache};
 use super::gmsh::{Algorithm, Gmsh, MeshingTask, is_of_hxt};
 use super::msh;
-use super::msh2::Contents;
 use super::script::{self, Script, quoted};
-use super::{Mesh, abaqus, arrays, digits, foreign};
+use super::{Mesh, abaqus, arrays, digits, foreign, msh2};
 use crate::error::{Error, Located, Result};
-use crate::file::{Digested, digest, digest_of_bytes, with_unix_lines, write};
+use crate::file::{Digested, digest, digest_of_bytes, write};
 use crate::interrupt::Interrupt;
 use crate::problem::mesh::{AdaptedMesh, is_shape};
 use crate::problem::{GmshSource, Guard, MeshSource, Order};
@@ -106,13 +105,12 @@ fn from_file<const D: usize>(
     let source = crate::file::open(path).map_err(|error| error.at(&file.place))?;
     let read = source.take(START).read_to_end(&mut start);
     read.map_err(|cause| Error::file(path, "read", &cause).at(&file.place))?;
-    let whole = || crate::file::read(path).map(with_unix_lines).map_err(|error| error.at(&file.place));
+    let whole = || crate::file::read(path).map_err(|error| error.at(&file.place));
     let mut loaded = match foreign::is_mesh(path, &start) {
         true if foreign::is_input_file(path) => {
-            let abaqus::Converted { mesh: bytes, notes } =
-                abaqus::convert(path, &whole()?, D).map_err(|error| error.at(&file.place))?;
-            let mesh = msh::parse(path, &bytes, MeshProducer::Other)?;
-            let digest = digest_of_bytes(&bytes);
+            let (mesh, notes) = abaqus::read::<D>(path, &whole()?).map_err(|error| error.at(&file.place))?;
+            // files that the file includes count, too
+            let digest = digest(&(mesh.points.as_flattened(), &mesh.groups[..]));
             Loaded { mesh, origin: MeshOrigin::File, file: path.clone(), digest, without_hxt: false, notes }
         }
         true => converted(file, &whole()?, interrupt)?,
@@ -130,7 +128,7 @@ fn from_file<const D: usize>(
 fn move_vertices(shown: &Path, file: &Path, places: &[[f64; 3]]) -> Result<()> {
     let mut mesh: Mesh<2> = read_file(shown, file, MeshProducer::Script, MeshOrigin::Gmsh)?.mesh;
     mesh.move_vertices_to(places);
-    write(file, Contents::of(&mesh).written())
+    write(file, msh2::written(&mesh))
 }
 
 /// Read a `.msh` file. `shown` is the file that the user named.
@@ -148,10 +146,11 @@ const WINDOW: usize = 1 << 18;
 ///
 /// # Errors
 /// The file cannot be read, or is no mesh.
-pub fn as_msh(file: &Path, dimension: usize) -> Result<Vec<u8>> {
+pub fn as_msh<const D: usize>(file: &Path) -> Result<Vec<u8>> {
     let bytes = crate::file::read(file)?;
     if foreign::is_input_file(file) {
-        abaqus::convert(file, &with_unix_lines(bytes), dimension).map(|converted| converted.mesh)
+        let (mesh, _) = abaqus::read::<D>(file, &bytes)?;
+        Ok(msh2::written(&mesh).into_bytes())
     } else {
         Ok(bytes)
     }

@@ -196,9 +196,7 @@ fn read_entity<const D: usize>(
 
 /// Read `$Nodes`: in each block first the tags, then the coordinates, perhaps with parameters on the entity.
 fn read_nodes<const D: usize>(scan: &mut Scanner, mesh: &mut MeshBuilder<D>) -> Result<()> {
-    let [blocks, total] = read_counts(scan)?;
-    let mut seen: usize = 0;
-    for _ in 0..blocks {
+    for _ in 0..read_blocks(scan)? {
         scan.begin(20)?;
         let dimension = scan.int()?;
         scan.int()?;
@@ -224,34 +222,24 @@ fn read_nodes<const D: usize>(scan: &mut Scanner, mesh: &mut MeshBuilder<D>) -> 
             scan.end()?;
             scan.place(mesh.node(tag, x))?;
         }
-        seen = seen.saturating_add(count);
     }
-    check_total(scan, "Nodes", seen, total)?;
     scan.place(mesh.number_nodes())
 }
 
-/// Read the head of `$Nodes` or `$Elements`: the numbers of blocks and of entries, and the least and largest tag.
-fn read_counts(scan: &mut Scanner) -> Result<[usize; 2]> {
+/// Read the head of `$Nodes` or `$Elements`, which has the numbers of blocks and of entries, and the least and largest
+/// tag. Return the number of blocks.
+fn read_blocks(scan: &mut Scanner) -> Result<usize> {
     scan.begin(32)?;
-    let counts = [scan.count()?, scan.count()?];
-    scan.size()?;
-    scan.size()?;
-    scan.end().map(|()| counts)
-}
-
-fn check_total(scan: &Scanner, section: &str, seen: usize, total: usize) -> Result<()> {
-    if seen == total {
-        Ok(())
-    } else {
-        let what = section.to_lowercase();
-        Err(scan.damaged(format!("${section} announces {total} {what} and holds {seen}")))
+    let blocks = scan.count()?;
+    for _ in 0..3 {
+        scan.size()?;
     }
+    scan.end().map(|()| blocks)
 }
 
 /// Read `$Elements`. Elements of entities without groups are skipped.
 fn read_elements<const D: usize>(scan: &mut Scanner, mesh: &mut MeshBuilder<D>, entities: &Entities) -> Result<()> {
-    let [blocks, total] = read_counts(scan)?;
-    let mut seen: usize = 0;
+    let blocks = read_blocks(scan)?;
     let mut nodes = Vec::new();
     for _ in 0..blocks {
         scan.begin(20)?;
@@ -271,7 +259,6 @@ fn read_elements<const D: usize>(scan: &mut Scanner, mesh: &mut MeshBuilder<D>, 
             return Err(scan.damaged(message));
         };
         let bytes = 8 * (1 + kind.nodes);
-        seen = seen.saturating_add(count);
         if groups.is_empty() {
             scan.skip(count, bytes)?;
             continue;
@@ -288,5 +275,5 @@ fn read_elements<const D: usize>(scan: &mut Scanner, mesh: &mut MeshBuilder<D>, 
             scan.place(mesh.element(kind, element, &nodes, groups))?;
         }
     }
-    check_total(scan, "Elements", seen, total)
+    Ok(())
 }

@@ -4,10 +4,10 @@
 //! number for all entities, so that groups are those of the physical tags alone. Entities are groups in a dimension
 //! without physical groups. An element of several groups stands in the file once for each of them.
 
-use super::Mesh;
 use super::builder::{MeshBuilder, kind_of};
 use super::scan::{Flaw, Scanner};
-use super::simplex::{ElementType, LINE, POINT, TRIANGLE};
+use super::simplex::{ElementType, LINE, POINT, TETRAHEDRON, TRIANGLE};
+use super::{Group, Mesh};
 use crate::error::Result;
 use std::collections::HashSet;
 use std::fmt::Write;
@@ -130,56 +130,35 @@ fn add<const D: usize>(
     mesh.element(*kind, *number, nodes, &[group])
 }
 
-/// A mesh to be written: nodes by their numbers, and groups of elements.
-#[derive(Default)]
-pub struct Contents {
-    /// Dimension and name of each group. Its tag is its place, from 1.
-    pub groups: Vec<(usize, String)>,
-    pub nodes: Vec<(u64, [f64; 3])>,
-    /// Number, type, group and nodes of each element, as many times as it has groups.
-    pub elements: Vec<(u64, i32, usize, Vec<u64>)>,
-}
-
-impl Contents {
-    /// Return the contents of a mesh in the plane. Each element is written once for each of its groups.
-    pub fn of(mesh: &Mesh<2>) -> Self {
-        let nodes = (1..).zip(mesh.points.iter().map(|&x| mesh.in_scene(x))).collect();
-        let mut contents = Self { nodes, ..Self::default() };
-        for (tag, group) in (1..).zip(mesh.groups.iter()) {
-            contents.groups.push((group.dimension, group.name.clone()));
-            let kind = ElementType::number([&POINT, &LINE, &TRIANGLE][group.dimension], group.stride);
-            for simplex in group.simplices() {
-                let number = contents.elements.len() as u64 + 1;
-                let mut nodes: Vec<u64> = simplex.iter().map(|&node| u64::from(node) + 1).collect();
-                if group.dimension == 2 {
-                    // Gmsh has the third edge as 20
-                    nodes[2 * mesh.order.degree() + 1..].reverse();
-                }
-                contents.elements.push((number, kind, tag, nodes));
-            }
-        }
-        contents
+/// Return a mesh as a text file. Each element stands once for each of its groups, whose tag is its place.
+pub fn written<const D: usize>(mesh: &Mesh<D>) -> String {
+    let mut text = format!("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n{}\n", mesh.groups.len());
+    // writing to a String cannot fail
+    for (tag, group) in (1..).zip(mesh.groups.iter()) {
+        let _ = writeln!(text, "{} {tag} \"{}\"", group.dimension, group.name);
     }
-
-    /// Return the file as text.
-    pub fn written(&self) -> String {
-        let mut text = format!("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n{}\n", self.groups.len());
-        // writing to a String cannot fail
-        for ((dimension, name), tag) in self.groups.iter().zip(1..) {
-            let _ = writeln!(text, "{dimension} {tag} \"{name}\"");
-        }
-        let _ = write!(text, "$EndPhysicalNames\n$Nodes\n{}\n", self.nodes.len());
-        for (tag, [x, y, z]) in &self.nodes {
-            let _ = writeln!(text, "{tag} {x:?} {y:?} {z:?}");
-        }
-        let _ = write!(text, "$EndNodes\n$Elements\n{}\n", self.elements.len());
-        for (number, kind, group, nodes) in &self.elements {
-            let _ = write!(text, "{number} {kind} 2 {group} {group}");
+    let _ = write!(text, "$EndPhysicalNames\n$Nodes\n{}\n", mesh.points.len());
+    for (tag, x) in (1..).zip(&mesh.points) {
+        let [x, y, z] = mesh.in_scene(*x);
+        let _ = writeln!(text, "{tag} {x:?} {y:?} {z:?}");
+    }
+    let count: usize = mesh.groups.iter().map(Group::len).sum();
+    let _ = write!(text, "$EndNodes\n$Elements\n{count}\n");
+    let mut number = 0;
+    for (tag, group) in (1..).zip(mesh.groups.iter()) {
+        let shape = [&POINT, &LINE, &TRIANGLE, &TETRAHEDRON][group.dimension];
+        let kind = ElementType::number(shape, group.stride);
+        for simplex in group.simplices() {
+            number += 1;
+            let _ = write!(text, "{number} {kind} 2 {tag} {tag}");
+            let mut nodes = simplex.to_vec();
+            // the reader's change of the order is its own inverse
+            ElementType::of(kind).iter().for_each(|kind| kind.reorder(&mut nodes));
             nodes.iter().for_each(|node| {
-                let _ = write!(text, " {node}");
+                let _ = write!(text, " {}", node + 1);
             });
             text.push('\n');
         }
-        text + "$EndElements\n"
     }
+    text + "$EndElements\n"
 }

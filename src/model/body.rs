@@ -327,7 +327,7 @@ impl Body {
 impl Interior {
     /// Factor the interior and return the body on its interface dofs.
     fn eliminate(&mut self) -> Result<ElasticBody> {
-        let (began, name) = (Instant::now(), self.chosen.prefix());
+        let (began, name) = (Instant::now(), self.chosen.name());
         let lower = self.interface.lower_triangle(&self.whole.stiffness);
         self.whole.stiffness = Csr::new(0);
         let (dofs, interface) = (self.load.len(), &self.interface.dofs);

@@ -27,7 +27,7 @@ impl CellKind {
 
     /// Return the dimension of the kind and its number in Gmsh.
     pub(super) fn gmsh(self) -> (i32, i32) {
-        const KINDS: [&[i32]; 3] = [&[1, 8, 26, 27, 28, 62, 63, 64], &[2, 9, 21, 23, 25, 42, 43, 45], &[4, 11]];
+        const KINDS: [&[i32]; 3] = [&[1, 8, 26, 27, 28, 62, 63, 64], &[2, 9, 21, 23, 25, 42, 43, 44], &[4, 11]];
         (self.dimension as i32, KINDS[self.dimension - 1][self.order - 1])
     }
 }

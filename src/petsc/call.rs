@@ -1,7 +1,7 @@
 //! How functions of PETSc are called, and what their errors become.
 //!
 //! PETSc reports an error frame by frame, innermost first, to a handler. The handler of this module records the frames
-//! and prints nothing. [`check_code`] reads them when the code has come back to Rust.
+//! and prints nothing. [`check`] reads them when the code has come back to Rust.
 //!
 //! Each library has integers of its own width. PETSc has [`Int`](super::Int), 32 or 64 bits as it was configured. MUMPS
 //! has [`MumpsInt`](super::ffi::MumpsInt) and METIS [`idx_t`](super::ffi::idx_t). Patterns of this program have 32
@@ -10,7 +10,6 @@
 use super::error::{Error, Result};
 use super::ffi;
 use super::ffi::PetscBool;
-use super::launch::with_quick_start;
 use std::cell::{Cell, RefCell};
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::ptr::{null, null_mut};
@@ -30,8 +29,7 @@ pub(super) fn runs() -> bool {
     RUNS.get()
 }
 
-/// Call one function of PETSc, which is started if necessary, and check its return code: `unsafe { petsc!(MatMult(a, x,
-/// y)) }?`.
+/// Call one function of PETSc and check its return code: `unsafe { petsc!(MatMult(a, x, y)) }?`.
 ///
 /// Each call stands in an `unsafe` block with its reason. The following holds for every call and is not repeated there:
 /// - A wrapper creates its object of PETSc and destroys it once, in `Drop`.
@@ -46,19 +44,7 @@ macro_rules! petsc {
 
 pub(super) use petsc;
 
-/// Run a call of PETSc, which is started without options if it does not run, and check its code.
-pub(super) fn check(function: &str, call: impl FnOnce() -> ffi::PetscErrorCode) -> Result<()> {
-    ensure_running()?;
-    check_code(function, call)
-}
-
-/// Start PETSc without options, and MPI with it, if it does not run.
-pub(super) fn ensure_running() -> Result<()> {
-    if runs() { Ok(()) } else { start(&[]) }
-}
-
-/// Start PETSc with the options in `words`, in the environment, and in files that these name. It starts MPI if that
-/// does not run.
+/// Start PETSc with the options in `words`, in the environment, and in files that these name. MPI runs.
 pub(super) fn start(words: &[String]) -> Result<()> {
     // PETSc keeps a pointer to these words until its end, so they are leaked, once
     let mut arguments = Vec::with_capacity(words.len() + OWN.len() + 2);
@@ -71,26 +57,26 @@ pub(super) fn start(words: &[String]) -> Result<()> {
     let (count, arguments) = (&raw mut count, &raw mut arguments);
     // The handler is pushed first, so that errors of the start are recorded, too. Handlers of the user
     // (-on_error_abort, -start_in_debugger) come on top of it. SAFETY: the handler has PETSc's own type.
-    check_code("PetscPushErrorHandler", || unsafe { ffi::PetscPushErrorHandler(Some(record), null_mut()) })?;
+    check("PetscPushErrorHandler", || unsafe { ffi::PetscPushErrorHandler(Some(record), null_mut()) })?;
     // SAFETY: words and count live until the end of the process.
     let initialize = || unsafe { ffi::PetscInitialize(count, arguments, null(), null()) };
-    with_quick_start(|| check_code("PetscInitialize", initialize))?;
+    check("PetscInitialize", initialize)?;
     RUNS.set(true);
-    for name in OWN {
-        let name = text(name)?;
-        // SAFETY: the name lives until the end of the call.
-        unsafe { petsc!(PetscOptionsClearValue(null_mut(), name.as_ptr())) }?;
-    }
-    Ok(())
+    OWN.into_iter().try_for_each(clear_option)
 }
 
-/// End PETSc, if it runs. It prints what options request for its end (-log_view).
+/// Remove an option, by its name with the dash, from PETSc's table.
+pub(super) fn clear_option(name: &str) -> Result<()> {
+    let name = text(name)?;
+    // SAFETY: the name lives until the end of the call; null means PETSc's one table.
+    unsafe { petsc!(PetscOptionsClearValue(null_mut(), name.as_ptr())) }
+}
+
+/// End PETSc. It prints what options request for its end (-log_view).
 pub(super) fn end() -> Result<()> {
-    if !RUNS.replace(false) {
-        return Ok(());
-    }
+    RUNS.set(false);
     // SAFETY: no object of PETSc is left, since each holds the session.
-    check_code("PetscFinalize", || unsafe { ffi::PetscFinalize() })
+    check("PetscFinalize", || unsafe { ffi::PetscFinalize() })
 }
 
 /// PETSc's report of an error that is being passed up.
@@ -106,7 +92,7 @@ thread_local! {
 }
 
 /// Run `call`, and turn a nonzero code into an error with PETSc's message.
-fn check_code(function: &str, call: impl FnOnce() -> ffi::PetscErrorCode) -> Result<()> {
+pub(super) fn check(function: &str, call: impl FnOnce() -> ffi::PetscErrorCode) -> Result<()> {
     TRACE.take();
     let code = call();
     // the code is an int in PETSc 3.18 and an enum in newer ones

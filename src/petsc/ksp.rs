@@ -10,7 +10,7 @@ use super::{Int, Matrix, Scope, Session, ffi};
 use std::cell::Cell;
 use std::ffi::CStr;
 use std::fmt;
-use std::ptr::null_mut;
+use std::ptr::{null, null_mut};
 
 /// The outcome of a linear solve.
 #[derive(Debug, Clone, PartialEq)]
@@ -95,10 +95,12 @@ impl Ksp {
             scope,
             session: session.clone(),
         };
-        let prefix = text(prefix)?;
+        let name = text(prefix)?;
+        // PETSc would print an empty prefix as a blank
+        let pointer = if prefix.is_empty() { null() } else { name.as_ptr() };
         // SAFETY: PETSc copies the text.
         unsafe {
-            petsc!(KSPSetOptionsPrefix(ksp, prefix.as_ptr()))?;
+            petsc!(KSPSetOptionsPrefix(ksp, pointer))?;
             petsc!(KSPSetErrorIfNotConverged(ksp, flag(false)))?;
         }
         Ok(solver)
@@ -138,6 +140,65 @@ impl Ksp {
             self.vectors = Some([new()?, new()?]);
         }
         Ok(())
+    }
+
+    /// Choose the types of the solver and of its preconditioner, which options may replace.
+    ///
+    /// # Errors
+    /// When PETSc does not know a type.
+    pub fn set_types(&self, ksp: Option<&str>, pc: Option<&str>) -> Result<()> {
+        // SAFETY: the solver of this wrapper.
+        unsafe { set_types(self.ksp, ksp, pc) }
+    }
+
+    /// Choose the value of an option, by its name without prefix, that the user has not typed for this solver. To be
+    /// called after [`set_types`](Self::set_types) and before the options are read.
+    ///
+    /// Types, tolerances, norms, and what a factorisation needs are set for this solver alone, also those of both
+    /// levels of a multigrid ([`set_interpolation`](Self::set_interpolation)). Other options are put into PETSc's table,
+    /// from where all solvers with this prefix read them.
+    ///
+    /// ```
+    /// use winkler::petsc::{Ksp, Matrix, Session};
+    /// let session = Session::start(&["-ksp_rtol".to_owned(), "1e-3".to_owned()])?;
+    /// let a = Matrix::from_csr(&session, 1, vec![0, 1], vec![0], vec![2.0])?;
+    /// let [mut direct, mut iterative] = [Ksp::new(&session, "")?, Ksp::new(&session, "")?];
+    /// direct.set_types(Some("preonly"), Some("lu"))?;
+    /// direct.set_default("pc_factor_mat_solver_type", "mumps")?;
+    /// iterative.set_types(Some("cg"), Some("gamg"))?;
+    /// iterative.set_default("ksp_norm_type", "natural")?;
+    /// iterative.set_default("pc_gamg_threshold", "0.1")?;
+    /// for ksp in [&mut direct, &mut iterative] {
+    ///     ksp.set_operator(&a)?;
+    ///     ksp.set_from_options()?;
+    ///     ksp.set_up()?;
+    /// }
+    /// assert_eq!((direct.ksp_type(), direct.factor_package()), ("preonly".into(), Some("mumps".into())));
+    /// assert_eq!((iterative.pc_type(), iterative.tolerance()), ("gamg".into(), 1e-3));
+    /// assert!(session.options().used("-pc_gamg_threshold") && session.options().typed().len() == 1);
+    /// session.clear_defaults();
+    /// assert!(!session.options().has("-pc_gamg_threshold"));
+    /// iterative.set_default("pc_gamg_threshold", "0.1")?;
+    /// session.options().set("pc_gamg_threshold", Some("0.2"))?;
+    /// session.clear_defaults();
+    /// assert!(session.options().has("-pc_gamg_threshold")); // it is the user's now
+    /// # Ok::<(), winkler::error::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// When PETSc refuses the value.
+    pub fn set_default(&self, name: &str, value: &str) -> Result<()> {
+        let levels = [("mg_coarse_", 0), ("mg_levels_", 1)];
+        let level = levels.into_iter().find_map(|(start, level)| Some((level, name.strip_prefix(start)?)));
+        let (solver, bare) = match level {
+            Some((level, bare)) => (self.smoother(level)?, bare),
+            None => (self.ksp, name),
+        };
+        // SAFETY: the solver of this wrapper, or one that belongs to its preconditioner.
+        if unsafe { set_value(solver, bare, value) }? {
+            return Ok(());
+        }
+        self.session.options().set_default(&format!("{}{name}", self.prefix), value)
     }
 
     /// Read the options of the solver. `preonly` never keeps a preconditioner of an older matrix, whatever is typed:
@@ -414,6 +475,14 @@ impl Ksp {
         }
     }
 
+    /// Return the solver on a level of a multigrid.
+    pub(super) fn smoother(&self, level: Int) -> Result<ffi::KSP> {
+        let (pc, mut smoother) = (self.pc()?, null_mut());
+        // SAFETY: the smoother belongs to the preconditioner. PETSc refuses another one than multigrid.
+        unsafe { petsc!(PCMGGetSmoother(pc, level, &mut smoother)) }?;
+        Ok(smoother)
+    }
+
     /// Return the preconditioner with all subspaces around it.
     fn outermost_pc(&self) -> Result<ffi::PC> {
         let mut pc = null_mut();
@@ -421,6 +490,55 @@ impl Ksp {
         unsafe { petsc!(KSPGetPC(self.ksp, &mut pc)) }?;
         Ok(pc)
     }
+}
+
+/// Choose the types of a solver and of its preconditioner.
+///
+/// # Safety
+/// The solver lives.
+unsafe fn set_types(ksp: ffi::KSP, solver: Option<&str>, preconditioner: Option<&str>) -> Result<()> {
+    let [solver, preconditioner] = [solver, preconditioner].map(|name| name.map(text).transpose());
+    let mut pc = null_mut();
+    // SAFETY: the caller's promise; the texts live until the end of the calls, and the solver owns its preconditioner.
+    unsafe {
+        if let Some(name) = solver? {
+            petsc!(KSPSetType(ksp, name.as_ptr()))?;
+        }
+        if let Some(name) = preconditioner? {
+            petsc!(KSPGetPC(ksp, &mut pc))?;
+            petsc!(PCSetType(pc, name.as_ptr()))?;
+        }
+    }
+    Ok(())
+}
+
+/// Set the value of an option of a solver, by its name without prefix, by a call. Return false if there is no call for
+/// it.
+///
+/// # Safety
+/// The solver lives.
+unsafe fn set_value(ksp: ffi::KSP, name: &str, value: &str) -> Result<bool> {
+    let (text, keep) = (text(value)?, -2.0);
+    let mut pc = null_mut();
+    // SAFETY: the caller's promise; the text lives until the end of the call, and the solver owns its preconditioner.
+    // -2 is PETSC_DEFAULT, which keeps a value.
+    unsafe {
+        petsc!(KSPGetPC(ksp, &mut pc))?;
+        match (name, value.parse::<f64>().ok()) {
+            ("ksp_type", _) => set_types(ksp, Some(value), None)?,
+            ("pc_type", _) => set_types(ksp, None, Some(value))?,
+            ("ksp_rtol", Some(rtol)) => petsc!(KSPSetTolerances(ksp, rtol, keep, keep, -2))?,
+            ("ksp_atol", Some(atol)) => petsc!(KSPSetTolerances(ksp, keep, atol, keep, -2))?,
+            ("ksp_max_it", Some(limit)) => petsc!(KSPSetTolerances(ksp, keep, keep, keep, limit as Int))?,
+            ("ksp_norm_type", _) if value == "natural" => {
+                petsc!(KSPSetNormType(ksp, ffi::KSPNormType_KSP_NORM_NATURAL))?;
+            }
+            ("pc_factor_mat_solver_type", _) => petsc!(PCFactorSetMatSolverType(pc, text.as_ptr()))?,
+            ("pc_factor_levels", Some(levels)) => petsc!(PCFactorSetLevels(pc, levels as Int))?,
+            _ => return Ok(false),
+        }
+    }
+    Ok(true)
 }
 
 impl Drop for Ksp {

@@ -3,7 +3,7 @@
 //! Through PETSc, MUMPS would take a poor ordering and return the complement in part only.
 
 use super::Session;
-use super::call::{ensure_running, fit};
+use super::call::fit;
 use super::error::{Error, Result};
 use super::ffi::{DMUMPS_STRUC_C, MumpsInt, dmumps_c};
 use super::metis::{self, Graph};
@@ -101,7 +101,6 @@ impl Schur {
         }
         fit::<MumpsInt>("MUMPS", "dofs", rows + 1)?;
         // MUMPS needs MPI
-        ensure_running()?;
         let scale = scales(rows, lower);
         let mut schur = Schur {
             // SAFETY: MUMPS' struct is plain C data; zeros are null pointers and sizes of nothing.

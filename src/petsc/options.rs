@@ -1,7 +1,7 @@
 //! The table of PETSc's options, which all solvers of a process share, and the words with which PETSc's options begin.
 
 use super::Session;
-use super::call::{self, flag, is_set, petsc, string, text};
+use super::call::{clear_option, flag, is_set, petsc, string, text};
 use super::error::{Error, Result};
 use super::session::{Entry, left};
 use std::ffi::CString;
@@ -51,6 +51,7 @@ impl Options {
     /// is full.
     pub fn set(&self, name: &str, value: Option<&str>) -> Result<()> {
         self.put(name, value)?;
+        self.session.defaults().borrow_mut().retain(|default| !default.eq_ignore_ascii_case(&dashed(name)));
         self.session.typed().borrow_mut().insert(dashed(name), value.map(str::to_owned));
         Ok(())
     }
@@ -61,13 +62,19 @@ impl Options {
     /// When the name is not a valid name of an option.
     pub fn clear(&self, name: &str) -> Result<()> {
         self.session.typed().borrow_mut().remove(&dashed(name));
-        let name = key(name)?;
-        // SAFETY: the text lives until the end of the call; null means PETSc's one table.
-        unsafe { petsc!(PetscOptionsClearValue(null_mut(), name.as_ptr())) }
+        key(name)?;
+        clear_option(&dashed(name))
     }
 
-    /// Set an option that the user has not typed.
-    pub(crate) fn put(&self, name: &str, value: Option<&str>) -> Result<()> {
+    /// Set an option that the user has not typed, until all of these are [cleared](Session::clear_defaults).
+    pub(super) fn set_default(&self, name: &str, value: &str) -> Result<()> {
+        self.put(name, Some(value))?;
+        self.session.defaults().borrow_mut().push(dashed(name));
+        Ok(())
+    }
+
+    /// Put an option into PETSc's table.
+    fn put(&self, name: &str, value: Option<&str>) -> Result<()> {
         let (name, value) = (key(name)?, value.map(text).transpose()?);
         let value = value.as_ref().map_or(null(), |value| value.as_ptr());
         // SAFETY: both texts live until the end of the call and end with a zero byte; PETSc copies them.
@@ -76,7 +83,7 @@ impl Options {
 
     /// Return the value of an option, empty for an option without a value, and mark it as read.
     pub fn get(&self, name: &str) -> Option<String> {
-        let name = key(name).ok().filter(|_| call::runs())?;
+        let name = key(name).ok()?;
         let (mut value, mut set) = (null(), flag(false));
         // SAFETY: the name lives until the end of the call; PETSc writes to the two variables only.
         unsafe { petsc!(PetscOptionsFindPair(null_mut(), null(), name.as_ptr(), &mut value, &mut set)) }.ok()?;
@@ -91,7 +98,7 @@ impl Options {
 
     /// Return whether an option is set and was read by PETSc or [`get`](Self::get).
     pub fn used(&self, name: &str) -> bool {
-        let Some(name) = key(name).ok().filter(|_| call::runs()) else { return false };
+        let Some(name) = key(name).ok() else { return false };
         let mut used = flag(false);
         // this function of PETSc expects the name without its dash
         let bare = &name.as_c_str().to_bytes_with_nul()[1..];
@@ -102,7 +109,7 @@ impl Options {
 
     /// Return the options that nobody has read so far, sorted by name.
     pub fn left(&self) -> Result<Vec<Entry>> {
-        if call::runs() { left() } else { Ok(Vec::new()) }
+        left()
     }
 }
 

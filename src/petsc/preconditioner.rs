@@ -93,10 +93,9 @@ impl Ksp {
     /// # Errors
     /// PETSc's, also when the preconditioner has no two levels.
     pub fn renew_smoother(&self, matrix: &Matrix) -> Result<()> {
-        let (pc, mut smoother) = (self.pc()?, null_mut());
+        let smoother = self.smoother(1)?;
         // SAFETY: the smoother belongs to the preconditioner, and refers to this matrix already.
         unsafe {
-            petsc!(PCMGGetSmoother(pc, 1, &mut smoother))?;
             // newer versions of PETSc keep the smoother's own preconditioner with that of all levels
             petsc!(KSPSetReusePreconditioner(smoother, flag(false)))?;
             petsc!(KSPSetOperators(smoother, matrix.raw(), matrix.raw()))?;

@@ -38,12 +38,14 @@ static STARTED: AtomicBool = AtomicBool::new(false);
 pub struct Session(Rc<Running>);
 
 struct Running {
-    /// All processes; none for a session of one process that starts MPI with PETSc, when something needs it.
-    world: Option<SimpleCommunicator>,
+    /// All processes.
+    world: SimpleCommunicator,
     /// Options of the user that PETSc has not read itself at its start, by their names with the dash.
     typed: RefCell<BTreeMap<String, Option<String>>>,
+    /// Names of options that solvers got as defaults.
+    defaults: RefCell<Vec<String>>,
     /// The token of MPI. Its drop ends MPI, after PETSc has ended.
-    _universe: Option<Universe>,
+    _universe: Universe,
 }
 
 impl Session {
@@ -62,8 +64,8 @@ impl Session {
             .ok_or_else(|| Error::new("MPI was already started in this process by other code"))?;
         let world = SimpleCommunicator::world();
         abort_on_panic(world.size() > 1);
-        let session =
-            Session(Rc::new(Running { world: Some(world), typed: RefCell::default(), _universe: Some(universe) }));
+        let (typed, defaults) = (RefCell::default(), RefCell::default());
+        let session = Session(Rc::new(Running { world, typed, defaults, _universe: universe }));
         if let Err(error) = call::start(words) {
             // the other ranks may still wait for this one inside PETSc, and ending MPI here would wait for them
             if session.size() > 1 {
@@ -73,25 +75,6 @@ impl Session {
         }
         session.typed().replace(left()?.into_iter().collect());
         Ok(session)
-    }
-
-    /// Return a session of this process alone and without options, which starts PETSc and MPI when something needs
-    /// them.
-    ///
-    /// ```
-    /// use winkler::petsc::{Ksp, Session};
-    /// let session = Session::alone()?;
-    /// assert_eq!((session.size(), mpi::environment::is_initialized()), (1, false));
-    /// Ksp::new(&session, "")?;
-    /// assert!(mpi::environment::is_initialized());
-    /// # Ok::<(), winkler::error::Error>(())
-    /// ```
-    ///
-    /// # Errors
-    /// When a session was started before in this process.
-    pub fn alone() -> Result<Session> {
-        start_once()?;
-        Ok(Session(Rc::new(Running { world: None, typed: RefCell::default(), _universe: None })))
     }
 
     /// Return whether `mpiexec` or `srun` started this process as one of several ranks.
@@ -106,12 +89,23 @@ impl Session {
         &self.0.typed
     }
 
+    /// Return the names of options that solvers got as defaults.
+    pub(super) fn defaults(&self) -> &RefCell<Vec<String>> {
+        &self.0.defaults
+    }
+
+    /// Remove the options that solvers got as defaults ([`Ksp::set_default`](super::Ksp::set_default)) from PETSc's
+    /// table.
+    pub fn clear_defaults(&self) {
+        self.0.clear_defaults();
+    }
+
     /// End PETSc and MPI if this is the last clone. PETSc writes its logs then.
     ///
     /// # Errors
     /// PETSc's, such as that of a log that it cannot write.
     pub fn finish(self) -> Result<()> {
-        if Rc::strong_count(&self.0) == 1 { call::end() } else { Ok(()) }
+        if Rc::strong_count(&self.0) == 1 { self.0.end() } else { Ok(()) }
     }
 
     /// Set the number of threads of OpenBLAS in this process, unless the user set OPENBLAS_NUM_THREADS or
@@ -125,23 +119,17 @@ impl Session {
 
     /// Return the rank of this process, from 0.
     pub fn rank(&self) -> usize {
-        self.0.world.as_ref().map_or(0, |world| world.rank() as usize)
+        self.0.world.rank() as usize
     }
 
     /// Return the number of processes.
     pub fn size(&self) -> usize {
-        self.0.world.as_ref().map_or(1, |world| world.size() as usize)
+        self.0.world.size() as usize
     }
 
     /// Return the communicator of all processes.
-    ///
-    /// # Panics
-    /// For a session of one process ([`alone`](Self::alone)), which has no messages.
     pub fn world(&self) -> &SimpleCommunicator {
-        match &self.0.world {
-            Some(world) => world,
-            None => unreachable!("a session of one process has no messages"),
-        }
+        &self.0.world
     }
 
     /// Return the version of PETSc, such as `3.18.5`.
@@ -172,8 +160,8 @@ impl Session {
         let _ = std::io::stdout().flush();
         // SAFETY: a null pointer means all files of the C library, which PETSc prints to.
         unsafe { libc::fflush(std::ptr::null_mut()) };
-        if let Some(world) = self.0.world.as_ref().filter(|_| is_launched()) {
-            world.abort(code);
+        if is_launched() {
+            self.0.world.abort(code);
         }
         std::process::exit(code)
     }
@@ -209,10 +197,27 @@ fn start_once() -> Result<()> {
     Ok(())
 }
 
+impl Running {
+    /// Remove the options that solvers got as defaults from PETSc's table.
+    fn clear_defaults(&self) {
+        // PETSc removes every option that it has taken before
+        self.defaults.take().iter().for_each(|name| drop(call::clear_option(name)));
+    }
+
+    /// End PETSc, if it runs.
+    fn end(&self) -> Result<()> {
+        if !call::runs() {
+            return Ok(());
+        }
+        self.clear_defaults();
+        call::end()
+    }
+}
+
 impl Drop for Running {
     fn drop(&mut self) {
         // callers that want the error call `finish`
-        let _ = call::end();
+        let _ = self.end();
     }
 }
 
@@ -239,7 +244,7 @@ pub struct Stage {
 }
 
 impl Session {
-    /// Begin a stage of PETSc's log, if PETSc runs. All processes have to begin the same stages.
+    /// Begin a stage of PETSc's log. All processes have to begin the same stages.
     ///
     /// ```
     /// use winkler::petsc::Session;
@@ -252,7 +257,7 @@ impl Session {
     /// ```
     pub fn stage(&self, name: &str) -> Stage {
         // a failure of the log does not end a run
-        Stage { is_logged: call::runs() && begin(name).is_ok() }
+        Stage { is_logged: begin(name).is_ok() }
     }
 }
 

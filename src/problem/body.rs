@@ -169,10 +169,6 @@ impl Check for BodySpec {
 pub const SPELLING: [&str; 2] =
     ["", "it is a prefix of PETSc options: a small letter, then small letters, digits and _"];
 
-/// The most numbers in the name of a body. With four, PETSc takes 24 times as long to look up the options of a solver;
-/// with eight it takes 40 320 times as long, which is 14 s.
-const MOST_NUMBERS: usize = 4;
-
 /// Return the name of a body as the program writes it: small letters, digits and `_`, beginning with a letter. This is
 /// the one rule for names in scenes and for names of groups of cells in mesh files of any format. Capitals become
 /// small, other characters `_`, and `body_` stands before a name that begins with something else.
@@ -235,12 +231,6 @@ pub fn fault(name: &str) -> Option<[&'static str; 2]> {
     if !name.starts_with(|c: char| c.is_ascii_lowercase()) || !name.chars().all(is_in_name) {
         return Some(SPELLING);
     }
-    // PETSc repeats the look-up of an option without each number between two `_`, and each of these again with the
-    // numbers that are left: k! look-ups for k numbers
-    let is_number = |word: &&str| !word.is_empty() && word.bytes().all(|byte| byte.is_ascii_digit());
-    if name.split('_').filter(is_number).count() > MOST_NUMBERS {
-        return Some(["a name of more than four numbers", "join numbers by a letter: brick_1x2x3"]);
-    }
     // `newton` is the prefix of the solver of all bodies together
     (begins_options(name) || name.split('_').any(is_family) || name == "newton")
         .then_some(["a word of PETSc's own options", "choose another name, also for the physical group in the mesh"])
@@ -276,6 +266,5 @@ mod tests {
             assert_eq!(fault(name), Some(SPELLING), "{name}");
         }
         assert_eq!(["punch", "upper2", "brick_17", "subway_log", "b_1_22_3_4"].map(fault), [None; 5]);
-        assert!(fault("b_1_2_3_4_5").is_some_and(|[label, _]| label.contains("four numbers")));
     }
 }

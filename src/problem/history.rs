@@ -13,7 +13,7 @@ use super::load::{LoadKind, Support};
 use super::read::{Either, Form, refused};
 use crate::error::{Error, Located, Result as Checked, joined};
 use crate::expression::Field;
-use crate::file::{other_encoding, with_unix_lines};
+use crate::file::other_encoding;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::json;
@@ -282,7 +282,6 @@ fn read_table(file: Located<PathBuf>) -> Checked<History> {
     if let Some(other) = other_encoding(&bytes) {
         return Err(Error::scene(&file.place, format!("{name} {other}")).help("save it as CSV in UTF-8"));
     }
-    let bytes = with_unix_lines(bytes);
     let mut format = csv::ReaderBuilder::new();
     format.has_headers(false).flexible(true).comment(Some(b'#')).trim(csv::Trim::All);
     let (mut reader, mut record) = (format.from_reader(&bytes[..]), csv::StringRecord::new());

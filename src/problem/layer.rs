@@ -246,36 +246,36 @@ impl TryFrom<LayerKeys> for LayerSpec {
 
     fn try_from(keys: LayerKeys) -> Result<Self, Refusal> {
         let LayerKeys { power, linear, exponential, cubic, table, pressure, up_to } = keys;
-        let given = [
-            ("power", place(&power)),
-            ("linear", place(&linear)),
-            ("exponential", place(&exponential)),
-            ("cubic", place(&cubic)),
-            ("table", place(&table)),
-            ("pressure", place(&pressure)),
-        ];
-        only_one("the layer", &given)?;
         if let (Some(end), None) = (&up_to, &pressure) {
             return Err(Error::scene(&end.place, "`up_to` without an expression")
                 .help("it says how far `pressure = \"...\"` goes; other laws need no end")
                 .into());
         }
-        let law = match pressure {
-            Some(text) => {
-                let law = Expression::uncompiled(&text.value, text.place);
-                Some(Self::Pressure { law, up_to: up_to.map(|end| end.value) })
-            }
-            None => table.map(|points| of_points(points.value)).transpose()?,
+        let up_to = up_to.map(|end| end.value);
+        let of_text = |text: Located<String>| {
+            let law = Expression::uncompiled(&text.value, text.place.clone());
+            Located::new(Self::Pressure { law, up_to }, text.place)
         };
-        law.or(power.map(|law| Self::Power(law.value)))
-            .or(linear.map(|law| Self::Linear(law.value)))
-            .or(exponential.map(|law| Self::Exponential(law.value)))
-            .or(cubic.map(|law| Self::Cubic(law.value)))
-            .ok_or_else(|| {
-                let help = "give power = { B = 2.5e-5, a = 0.5 } or linear = { stiffness = 1e5 }";
-                Error::new(Kind::Scene, "the layer has no law").help(help).into()
-            })
+        let of_table = |table: Located<_>| Ok::<_, Error>(Located::new(of_points(table.value)?, table.place));
+        let laws = [
+            ("power", given(power, Self::Power)),
+            ("linear", given(linear, Self::Linear)),
+            ("exponential", given(exponential, Self::Exponential)),
+            ("cubic", given(cubic, Self::Cubic)),
+            ("table", table.map(of_table).transpose()?),
+            ("pressure", pressure.map(of_text)),
+        ];
+        only_one("the layer", &laws.each_ref().map(|(key, law)| (*key, place(law))))?;
+        laws.into_iter().find_map(|(_, law)| law).map(|law| law.value).ok_or_else(|| {
+            let help = "give power = { B = 2.5e-5, a = 0.5 } or linear = { stiffness = 1e5 }";
+            Error::new(Kind::Scene, "the layer has no law").help(help).into()
+        })
     }
+}
+
+/// Return the law of parameters that are given, at their place.
+fn given<T>(parameters: Option<Located<T>>, law: impl FnOnce(T) -> LayerSpec) -> Option<Located<LayerSpec>> {
+    parameters.map(|Located { value, place }| Located::new(law(value), place))
 }
 
 /// Return the law through points (c, p).

@@ -9,6 +9,7 @@ use crate::fem::Prolongation;
 use crate::file::available_memory;
 use crate::linalg::Csr;
 use crate::model::{Body, BodyCounts, LinearStep};
+use crate::parallel::least;
 use crate::petsc::{HAS_HYPRE, Rows, Session};
 use crate::problem::{Linear, MethodName, Preset};
 use crate::scene::Scene;
@@ -17,8 +18,6 @@ use crate::solver::names::WHOLE;
 use crate::solver::options::{Chosen, UserOptions};
 use crate::solver::preset::{self, Smoother};
 use crate::solver::{InterfaceDofs, Krylov, MakeSolver};
-use mpi::collective::SystemOperation;
-use mpi::traits::CommunicatorCollectives;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A factory that makes the inner solvers of a scene's bodies by its plan.
@@ -52,18 +51,14 @@ impl<'a> SolverFactory<'a> {
     /// Start from the free memory and the options that the user wrote. The problem before had the solvers `before`.
     /// Collective.
     pub fn new(session: &'a Session, scene: &Scene, before: Option<(Solvers, Box<dyn LinearStep>)>) -> Result<Self> {
-        let mine = available_memory() as u64;
-        let mut least = mine;
-        if session.size() > 1 {
-            session.world().all_reduce_into(&mine, &mut least, SystemOperation::min());
-        }
+        session.clear_defaults();
         let typed = UserOptions::read(session);
         let asked = SolverRequest {
             preset: scene.solver.preset,
             linear: scene.method.linear,
             method: scene.method.name,
             whole: typed.of(WHOLE),
-            memory: least as usize,
+            memory: least(session, available_memory() as u64) as usize,
             ranks: session.size(),
         };
         let (before, step) = before.unzip();
@@ -177,7 +172,7 @@ impl<'a> SolverFactory<'a> {
         for chosen in chosen.into_iter().filter(|chosen| chosen.get("ksp_type") == Some("preonly")) {
             let pc = chosen.get("pc_type").unwrap_or_default();
             if !matches!(pc, "cholesky" | "lu") {
-                kinds.entry(pc).or_default().push(chosen.prefix().to_owned());
+                kinds.entry(pc).or_default().push(chosen.name().to_owned());
             }
         }
         let warning = |(pc, names): (&str, Vec<String>)| {

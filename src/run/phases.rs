@@ -183,7 +183,7 @@ pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clo
     collectively(session, built.discrete.model.condense())?;
     let method = collectively(session, make(session, &mut built, &mut start))?;
     let names: Vec<&str> = built.discrete.bodies.iter().map(|body| body.name.as_str()).collect();
-    let warnings = collectively(session, options::unread(session, &names))?;
+    let warnings = collectively(session, options::unread(session, &names, &built.options))?;
     if built.options.is_empty() && session.options().has("-help") {
         options::show_help(session)?;
     }

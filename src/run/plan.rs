@@ -229,11 +229,8 @@ fn agree(bodies: &mut [BodyPlan]) {
 }
 
 /// Dofs for which a rank could solve in the time of the messages of a distributed body. An iteration of conjugate
-/// gradients with multigrid takes 0.5 us per dof (docs/parallel.md, 48^3: 42 s, 116 iterations, 705 894 dofs). It has
-/// some 50 messages of 10 us: four exchanges with neighbours on each of eight levels, and a few sums.
-///
-/// Measurements on two ranks of one machine (`patch-3d`, nu = 2, `ncg`, hypre) had 3993, 10 125 and 27 783 dofs. An
-/// iteration takes -28, 80 and 339 us more than half of that of one rank, which is the work of 0, 540 and 1900 dofs.
+/// gradients with multigrid takes 0.5 us per dof (docs/parallel.md), and some 50 messages of 10 us: four exchanges with
+/// neighbours on each of eight levels, and a few sums. A smaller number distributes bodies that one rank solves faster.
 const MESSAGES: usize = 1000;
 
 /// Distribute the largest bodies over all ranks, as many as make a sweep shortest. Each other body stays whole on one

@@ -120,7 +120,6 @@ pub fn text(path: &Path) -> Result<String> {
         }
         _ => error,
     })?;
-    let bytes = crate::file::with_unix_lines(bytes);
     if let Some(other) = crate::file::other_encoding(&bytes) {
         return Err(Error::new(Kind::File, format!("{} {other}", path.display())).help("save the scene file as UTF-8"));
     }

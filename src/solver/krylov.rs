@@ -1,23 +1,20 @@
 //! Any KSP and PC of PETSc as inner solver.
 
-use super::options::{Chosen, OptionGroup};
+use super::options::Chosen;
 use super::{Change, InnerSolver, SolveOutcome};
 use crate::error::{Error, Kind, Result};
 use crate::fem::Prolongation;
 use crate::linalg::Csr;
 use crate::linalg::portable::log10;
 use crate::petsc::{ConvergenceTest, Ksp, Matrix, Rows, Session};
-use std::rc::Rc;
 
-/// G as a PETSc matrix with a KSP that takes its options from PETSc's table, where they stand while it lives.
+/// G as a PETSc matrix with a KSP that takes its options from PETSc's table.
 ///
 /// A multigrid preconditioner is kept while G changes, if the user has not decided this by `-ksp_reuse_preconditioner`.
 /// Dofs at which it is poor then are solved exactly around it. This local correction is called a patch.
 pub struct Krylov {
     session: Session,
     chosen: Chosen,
-    /// The options in PETSc's table.
-    _group: Rc<OptionGroup>,
     matrix: Matrix,
     ksp: Ksp,
     /// Whether G has changed since the last set-up.
@@ -79,25 +76,27 @@ impl Krylov {
         let mut matrix = Matrix::new(session, dimension, stiffness)?;
         let levels = if interpolation.is_some() { 2 } else { 1 };
         matrix.set_spd()?;
-        let group = chosen.group(session)?;
-        let mut ksp = Ksp::of(session, matrix.scope(), &format!("{}_", group.prefix))?;
-        if group.prefix != chosen.prefix() {
-            ksp.set_name(chosen.prefix())?;
+        let mut ksp = Ksp::of(session, matrix.scope(), chosen.prefix())?;
+        if !chosen.has_own() {
+            ksp.set_name(chosen.name())?;
         }
         ksp.set_operator(&matrix)?;
+        let explain = |error: crate::petsc::Error| chosen.explain(error.into());
+        ksp.set_types(chosen.get("ksp_type"), chosen.get("pc_type")).map_err(explain)?;
         if let Some(interpolation) = interpolation {
             let Prolongation { rows: Csr { ptr, col, values, .. }, own } = interpolation;
             ksp.set_interpolation(&matrix, [&super::integers(ptr), &super::integers(col)], &values, own)?;
         }
         chosen.refuse_idle()?;
-        ksp.set_from_options().map_err(|error| chosen.explain(error.into()))?;
+        chosen.defaults().try_for_each(|(name, value)| ksp.set_default(name, value)).map_err(explain)?;
+        ksp.set_from_options().map_err(explain)?;
         if ksp.pc_type() == "gamg" && !near_null_space.is_empty() {
             matrix.set_near_null_space(near_null_space)?;
         }
         let multigrid = match ksp.pc_type().as_str() {
             "hypre" | "gamg" | "ml" => true,
             // with other numbers of levels it is what the user makes of it
-            "mg" => check_levels(&ksp, chosen.prefix(), levels)? == 2,
+            "mg" => check_levels(&ksp, chosen.name(), levels)? == 2,
             _ => false,
         } && ksp.ksp_type() != "preonly";
         let is_applied_once = multigrid && !chosen.steers_iteration();
@@ -107,7 +106,6 @@ impl Krylov {
         Ok(Self {
             session,
             chosen,
-            _group: group,
             matrix,
             ksp,
             free,
@@ -299,7 +297,7 @@ impl InnerSolver for Krylov {
 ///
 /// # Errors
 /// There are more levels.
-fn check_levels(ksp: &Ksp, prefix: &str, most: usize) -> Result<usize> {
+fn check_levels(ksp: &Ksp, name: &str, most: usize) -> Result<usize> {
     let levels = ksp.multigrid_levels()?;
     if levels <= most {
         return Ok(levels);
@@ -311,7 +309,7 @@ fn check_levels(ksp: &Ksp, prefix: &str, most: usize) -> Result<usize> {
     };
     Err(Error::new(
         Kind::Solver,
-        format!("`{prefix}`: multigrid `mg` has {levels} levels here, and the mesh has only {most}"),
+        format!("`{name}`: multigrid `mg` has {levels} levels here, and the mesh has only {most}"),
     )
     .because(only)
     .help("give no more by -pc_mg_levels, or take a multigrid that makes its own levels: -pc_type gamg or hypre"))

@@ -4,24 +4,20 @@
 //! An option for all bodies is called *plain* here, and an option that starts with the name of a body is that body's
 //! *own*.
 //!
-//! 1. [`UserOptions`] gives each solver its options ([`Chosen`]). A plain option of a PETSc object (KSP, PC, Mat)
-//!    applies to every solver that has no own option of that name. The program adds its choice where the user wrote
-//!    nothing.
-//! 2. PETSc does not fall back from a prefixed name to the plain one. So these options stand in its table under the
-//!    prefix of a [`OptionGroup`] for as long as its solvers live. The prefix is the name of the body if the body has
-//!    options of its own, and `newton` for the matrix of all bodies. Other bodies with the same options share a prefix,
-//!    such as `hypre_bodies`, since the table holds only 512 options.
+//! 1. [`UserOptions`] gives each solver its options ([`Chosen`]). A solver for which an own option was typed has the
+//!    name of its body, or `newton` for the matrix of all bodies, as prefix in PETSc's table, and reads only options
+//!    with this prefix. All others have no prefix and read the plain options, as in a program with one solver.
+//! 2. The program adds its choice where the user wrote nothing. What solvers without a prefix may have differently, such
+//!    as types and tolerances, is set by calls of PETSc ([`Ksp::set_default`]).
 //! 3. When all solvers are set up, [`unread()`] goes through what nobody has read. A mistyped name ends the run before
 //!    it starts.
 
-use super::names::{self, WHOLE, is_control_of_mumps, looks, nest_of};
+use super::names::{self, is_control_of_mumps, looks, nest_of};
 use crate::error::{Error, Kind, Result};
 use crate::exchange::all_gather;
 use crate::parallel::Ranks;
-use crate::petsc::{Entry, Ksp, Matrix, Options, Session, is_family, is_global};
-use std::cell::RefCell;
+use crate::petsc::{Entry, Ksp, Matrix, Session, is_family, is_global};
 use std::collections::BTreeMap;
-use std::rc::{Rc, Weak};
 
 /// The options of solvers that the user wrote, on the command line, in the environment and in files.
 #[derive(Default)]
@@ -39,20 +35,22 @@ impl UserOptions {
         Self(session.options().typed())
     }
 
-    /// Return the options of the solver with a prefix: its own ones, and plain ones of PETSc's objects that it has not
-    /// as its own.
-    pub fn of(&self, prefix: &str) -> Chosen {
-        let mut chosen = Chosen { prefix: prefix.to_owned(), choices: BTreeMap::new() };
-        for (start, origin) in [(format!("-{prefix}_"), OptionOrigin::Own), ("-".to_owned(), OptionOrigin::Plain)] {
+    /// Return the options of the solver with this name: its own ones, or the plain ones if it has none.
+    pub fn of(&self, name: &str) -> Chosen {
+        let own = format!("{}_", name.to_ascii_lowercase());
+        let [own, plain] = [own, String::new()].map(|prefix| {
+            let start = format!("-{prefix}");
+            let mut chosen = Chosen { name: name.to_owned(), prefix, choices: BTreeMap::new() };
             for (option, value) in &self.0 {
-                let name = option.to_ascii_lowercase();
                 // no name of a body has a word of a family in it
-                if let Some(name) = name.strip_prefix(&start).filter(|name| is_of_family(name)) {
-                    chosen.add(name, value.as_deref(), origin);
+                let option = option.to_ascii_lowercase();
+                if let Some(name) = option.strip_prefix(&start).filter(|name| is_of_family(name)) {
+                    chosen.add(name, value.as_deref(), true);
                 }
             }
-        }
-        chosen
+            chosen
+        });
+        if own.choices.is_empty() { plain } else { own }
     }
 }
 
@@ -61,22 +59,11 @@ fn is_of_family(bare: &str) -> bool {
     bare.split_once('_').is_some_and(|(first, _)| is_family(first))
 }
 
-/// Why a solver has an option.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum OptionOrigin {
-    /// The user wrote it with the prefix of this solver, so that it stands in PETSc's table.
-    Own,
-    /// The user wrote it for all solvers.
-    Plain,
-    /// The program chose it.
-    Default,
-}
-
 #[derive(Debug, Clone, PartialEq)]
 struct SolverOption {
-    name: String,
     value: Option<String>,
-    origin: OptionOrigin,
+    /// Whether the user wrote it; if not, the program chose it.
+    is_typed: bool,
 }
 
 impl SolverOption {
@@ -86,27 +73,33 @@ impl SolverOption {
     }
 }
 
-/// The options of one solver: its own ones, plain ones that it has not as its own, and the program's choice where the
-/// user wrote nothing.
+/// The options of one solver: those that the user wrote, and the program's choice where the user wrote nothing.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Chosen {
-    /// The word before the underscore of the solver's own options: the name of the body.
+    /// The name of the body, or `newton`.
+    name: String,
+    /// What the names of its options begin with in PETSc's table: nothing, or the name with an underscore.
     prefix: String,
     /// Keys are names in small letters, because PETSc ignores the case of names.
     choices: BTreeMap<String, SolverOption>,
 }
 
 impl Chosen {
-    /// Add an option, unless one of this name is there already. So own options are added first, then plain ones, then
-    /// defaults.
-    fn add(&mut self, name: &str, value: Option<&str>, origin: OptionOrigin) {
-        let choice = || SolverOption { name: name.to_owned(), value: value.map(str::to_owned), origin };
-        self.choices.entry(name.to_ascii_lowercase()).or_insert_with(choice);
+    /// Add an option, unless one of this name is there already.
+    fn add(&mut self, name: &str, value: Option<&str>, is_typed: bool) {
+        let choice = || SolverOption { value: value.map(str::to_owned), is_typed };
+        self.choices.entry(name.to_owned()).or_insert_with(choice);
     }
 
     /// Set an option that is not set yet, as the program's choice. It never counts as typed.
     pub fn set_default(&mut self, name: &str, value: &str) {
-        self.add(name, Some(value), OptionOrigin::Default);
+        self.add(name, Some(value), false);
+    }
+
+    /// Return name and value of each option that the program chose.
+    pub fn defaults(&self) -> impl Iterator<Item = (&str, &str)> {
+        let chosen = self.choices.iter().filter(|(_, choice)| !choice.is_typed);
+        chosen.map(|(name, choice)| (name.as_str(), choice.value()))
     }
 
     /// Choose MUMPS for `cholesky` and `lu`, in this solver and in those nested in it (`-sub_pc_type lu`), where
@@ -117,7 +110,12 @@ impl Chosen {
         nests.iter().for_each(|nest| self.set_default(&format!("{nest}pc_factor_mat_solver_type"), "mumps"));
     }
 
-    /// Return the word before the underscore of the solver's own options.
+    /// Return the name of the body, or `newton`.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Return what the names of the options begin with in PETSc's table.
     pub fn prefix(&self) -> &str {
         &self.prefix
     }
@@ -130,41 +128,38 @@ impl Chosen {
     /// Return the value in force if the user wrote it.
     pub fn typed(&self, name: &str) -> Option<&str> {
         let choice = self.choices.get(&name.to_ascii_lowercase())?;
-        (choice.origin != OptionOrigin::Default).then(|| choice.value())
+        choice.is_typed.then(|| choice.value())
     }
 
     /// Return name, in small letters, and value of each option that the user wrote.
     pub fn all_typed(&self) -> impl Iterator<Item = (&str, &str)> {
-        let typed = self.choices.iter().filter(|(_, choice)| choice.origin != OptionOrigin::Default);
+        let typed = self.choices.iter().filter(|(_, choice)| choice.is_typed);
         typed.map(|(name, choice)| (name.as_str(), choice.value()))
     }
 
     /// Return the options of a family that the user wrote and that only [look](looks), as they were typed.
     pub fn all_looking(&self, family: &str) -> impl Iterator<Item = String> {
-        let looking = self.choices.iter().filter(move |(name, _)| name.starts_with(family) && looks(name));
-        looking.map(|(name, choice)| self.written(name, choice))
+        let looking = self.all_typed().filter(move |(name, _)| name.starts_with(family) && looks(name));
+        looking.map(|(name, _)| self.written(name))
     }
 
-    /// Return the name of an option as the user wrote it.
-    fn written(&self, name: &str, choice: &SolverOption) -> String {
-        match choice.origin {
-            OptionOrigin::Own => format!("-{}_{name}", self.prefix),
-            _ => format!("-{name}"),
-        }
+    /// Return the name of an option as the user writes it.
+    fn written(&self, name: &str) -> String {
+        format!("-{}{name}", self.prefix)
     }
 
     /// Return the controls of MUMPS that the user wrote, and mark them as read.
     pub fn controls_of_mumps(&self, session: &Session) -> Vec<(&str, &str)> {
         let controls: Vec<_> = self.all_typed().filter(|(name, _)| is_control_of_mumps(name)).collect();
         for (name, _) in &controls {
-            let _ = [format!("-{}_{name}", self.prefix), format!("-{name}")].map(|name| session.options().has(&name));
+            session.options().has(&self.written(name));
         }
         controls
     }
 
-    /// Return all options as they would be typed.
+    /// Return all options as they would be typed for all solvers.
     pub fn in_words(&self) -> String {
-        let words = self.choices.values().map(|SolverOption { name, value, .. }| match value {
+        let words = self.choices.iter().map(|(name, choice)| match &choice.value {
             Some(value) => format!("-{name} {value}"),
             None => format!("-{name}"),
         });
@@ -197,7 +192,7 @@ impl Chosen {
         let is_idle =
             |(name, value): &(&str, &str)| is_limit(name) && value.parse::<i64>().is_ok_and(|limit| limit < 1);
         let idle = self.all_typed().find(is_idle);
-        idle.map_or(Ok(()), |(name, value)| Err(Ksp::idle(&format!("-{}_{name}", self.prefix), value).into()))
+        idle.map_or(Ok(()), |(name, value)| Err(Ksp::idle(&self.written(name), value).into()))
     }
 
     /// Name the option of an unknown type of KSP or PC, if that is why PETSc refused a solver, or return PETSc's error.
@@ -208,14 +203,14 @@ impl Chosen {
             object.is_some_and(|object| text.contains(&format!("requested {object} type {} ", choice.value())))
         };
         let Some((name, choice)) = self.choices.iter().find(is_refused) else { return error };
-        let (name, value) = (self.written(name, choice), choice.value());
+        let (name, value) = (self.written(name), choice.value());
         let advice = names::type_instead(&name, value);
         Error::new(Kind::Solver, format!("{name} {value}: this PETSc does not know the type `{value}`")).help(advice)
     }
 
     /// Return whether the user wrote an option for this solver alone.
     pub fn has_own(&self) -> bool {
-        self.choices.values().any(|choice| choice.origin == OptionOrigin::Own)
+        !self.prefix.is_empty()
     }
 
     /// Return whether the user wrote an option whose name begins with `family`.
@@ -235,66 +230,6 @@ impl Chosen {
             _ => false,
         };
         self.all_typed().any(|(name, value)| name.ends_with("pc_type") && !works(name, value))
-    }
-
-    /// Put the options into PETSc's table, and return the group of solvers that has them. They leave it with the last
-    /// solver that holds the group.
-    ///
-    /// # Errors
-    /// PETSc's table is full, at 512 options.
-    pub fn group(&self, session: &Session) -> Result<Rc<OptionGroup>> {
-        let live = live_groups();
-        let is_apart = self.has_own() || self.prefix == WHOLE;
-        if let Some(same) = live.iter().find(|group| !is_apart && group.options.choices == self.choices) {
-            return Ok(same.clone());
-        }
-        let shared = format!("{}_bodies", self.get("pc_type").unwrap_or("plain"));
-        let names = std::iter::once(shared.clone()).chain((2..).map(|number| format!("{shared}{number}")));
-        let is_free = |name: &String| !live.iter().any(|group| group.prefix == *name);
-        let prefix = if is_apart { self.prefix.clone() } else { names.into_iter().find(is_free).unwrap_or(shared) };
-        let mut group = OptionGroup { prefix, options: self.clone(), copies: Vec::new(), table: session.options() };
-        for choice in self.choices.values().filter(|choice| choice.origin != OptionOrigin::Own) {
-            let copy = format!("-{}_{}", group.prefix, choice.name);
-            group.table.put(&copy, choice.value.as_deref())?;
-            group.copies.push((copy, format!("-{}", choice.name)));
-        }
-        let group = Rc::new(group);
-        GROUPS.with_borrow_mut(|groups| groups.push(Rc::downgrade(&group)));
-        Ok(group)
-    }
-}
-
-/// Solvers with the same options, which stand in PETSc's table under one prefix.
-pub struct OptionGroup {
-    /// The prefix, without its underscore.
-    pub prefix: String,
-    options: Chosen,
-    /// The names of the options that the user has not typed with this prefix, and the plain name of each.
-    copies: Vec<(String, String)>,
-    table: Options,
-}
-
-thread_local! {
-    /// The groups of this process, which has one table of options.
-    static GROUPS: RefCell<Vec<Weak<OptionGroup>>> = const { RefCell::new(Vec::new()) };
-}
-
-/// Return the groups whose solvers live.
-fn live_groups() -> Vec<Rc<OptionGroup>> {
-    GROUPS.with_borrow_mut(|groups| {
-        groups.retain(|group| group.strong_count() > 0);
-        groups.iter().filter_map(Weak::upgrade).collect()
-    })
-}
-
-impl Drop for OptionGroup {
-    fn drop(&mut self) {
-        let live = live_groups();
-        let is_kept = |copy: &str| live.iter().any(|group| group.copies.iter().any(|(other, _)| other == copy));
-        for (copy, _) in self.copies.iter().filter(|(copy, _)| !is_kept(copy)) {
-            // an error can no longer be returned
-            let _ = self.table.clear(copy);
-        }
     }
 }
 
@@ -338,23 +273,17 @@ fn is_option(word: &str) -> bool {
     word.strip_prefix('-').is_some_and(|rest| rest.starts_with(|c: char| c == '-' || c.is_ascii_alphabetic()))
 }
 
-/// Return the warnings of options that no solver of any rank has read, with common names. Collective; to be called
-/// after all solvers are set up.
+/// Return the warnings of options that none of the `solvers` has read on any rank, with common names. Collective; to be
+/// called after all solvers are set up.
 ///
 /// # Errors
 /// An option that is not among the common names was not read either: the name is taken for a typing mistake.
-pub fn unread(session: &Session, bodies: &[&str]) -> Result<Vec<String>> {
-    let (options, groups) = (session.options(), live_groups());
+pub fn unread(session: &Session, bodies: &[&str], solvers: &[Chosen]) -> Result<Vec<String>> {
+    let options = session.options();
     let typed: Vec<String> = options.typed().into_iter().map(|(name, _)| name).collect();
-    let is_read = |name: &&String| {
-        let mut copies = groups.iter().flat_map(|group| &group.copies);
-        let is_copy_read = copies.any(|(copy, plain)| plain.eq_ignore_ascii_case(name) && options.used(copy));
-        is_copy_read || is_global(&name[1..]) || options.used(name) || is_read_by_solves(name, &groups)
-    };
+    let is_read = |name: &&String| is_global(&name[1..]) || options.used(name) || is_read_by_solves(name, solvers);
     let mine: Vec<String> = typed.iter().filter(is_read).cloned().collect();
-    let (read, has_solvers): (Vec<_>, Vec<_>) =
-        all_gather(&Ranks::new(session), (mine, !groups.is_empty())).into_iter().unzip();
-    let (read, has_solvers) = (read.concat(), has_solvers.contains(&true));
+    let read = all_gather(&Ranks::new(session), mine).concat();
     // without this option PETSc would list what is left at its end once more
     let is_listed = options.has("-options_left");
     let (mut warnings, mut watching) = (Vec::new(), Vec::new());
@@ -364,18 +293,18 @@ pub fn unread(session: &Session, bodies: &[&str]) -> Result<Vec<String>> {
         if is_read || !is_listed {
             options.has(option);
         }
-        match () {
-            () if is_read => {}
-            () if !has_solvers && is_of_family(bare) && looks(bare) => watching.push(option.as_str()),
-            () if names::is_common(bare) => {
-                warnings.push(format!("option {option} was not used: no solver of this run reads it"));
-            }
-            () => {
-                let error = Error::new(Kind::Solver, format!("no solver of this run reads the option {option}"));
-                let near = || names::meant(option, bodies).map(|near| format!("did you mean -{near}?"));
-                let advice = names::instead(bare).map(str::to_owned).or_else(near);
-                return Err(error.help(advice.unwrap_or_else(|| "`-help` lists the options of this run".to_owned())));
-            }
+        if is_read {
+            continue;
+        }
+        if solvers.is_empty() && is_of_family(bare) && looks(bare) {
+            watching.push(option.as_str());
+        } else if names::is_common(bare) {
+            warnings.push(format!("option {option} was not used: no solver of this run reads it"));
+        } else {
+            let error = Error::new(Kind::Solver, format!("no solver of this run reads the option {option}"));
+            let near = || names::meant(option, bodies).map(|near| format!("did you mean -{near}?"));
+            let advice = names::instead(bare).map(str::to_owned).or_else(near);
+            return Err(error.help(advice.unwrap_or_else(|| "`-help` lists the options of this run".to_owned())));
         }
     }
     if !watching.is_empty() {
@@ -388,15 +317,12 @@ pub fn unread(session: &Session, bodies: &[&str]) -> Result<Vec<String>> {
 }
 
 /// Return whether an option is one that solvers read in each solve, and not in their set-up.
-fn is_read_by_solves(option: &str, groups: &[Rc<OptionGroup>]) -> bool {
-    let option = option[1..].to_ascii_lowercase();
-    let is_of = |group: &Rc<OptionGroup>| {
-        group.options.all_typed().any(|(name, _)| {
-            name.ends_with("ksp_converged_reason")
-                && (name == option || option.strip_suffix(name) == Some(&format!("{}_", group.options.prefix)))
-        })
+fn is_read_by_solves(option: &str, solvers: &[Chosen]) -> bool {
+    let is_of = |chosen: &Chosen| {
+        let mut names = chosen.all_typed().filter(|(name, _)| name.ends_with("ksp_converged_reason"));
+        names.any(|(name, _)| chosen.written(name).eq_ignore_ascii_case(option))
     };
-    groups.iter().any(is_of)
+    solvers.iter().any(is_of)
 }
 
 /// Print the options of a solver as `-help` does, for a run that makes no solver of PETSc.
@@ -413,20 +339,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn own_options_win_over_those_of_all_and_over_defaults() {
-        let options = [("-KSP_type", "gmres"), ("-b_1_pc_type", "icc"), ("-b_ksp_type", "cg"), ("-pc_type", "lu")];
+    fn own_options_replace_those_of_all_and_win_over_defaults() {
+        let options = [("-KSP_type", "gmres"), ("-b_1_pc_type", "icc"), ("-B_ksp_type", "cg"), ("-pc_type", "lu")];
         let typed = UserOptions::of_test(&options);
         let mut chosen = typed.of("b");
         chosen.set_default("pc_type", "hypre");
-        chosen.set_default("ksp_rtol", "1e-6");
-        let names = ["ksp_type", "PC_type", "ksp_rtol", "none"];
-        assert_eq!(names.map(|name| chosen.get(name)), [Some("cg"), Some("lu"), Some("1e-6"), None]);
-        assert_eq!(names.map(|name| chosen.typed(name)), [Some("cg"), Some("lu"), None, None]);
-        assert_eq!(
-            ["ksp_type", "pc_type"].map(|name| typed.of("b_1").get(name).map(str::to_owned)),
-            ["gmres", "icc"].map(|value| Some(value.to_owned()))
-        );
-        assert!(chosen.has_own() && !typed.of("c").has_own() && typed.of("c").has_typed_of("pc_"));
+        chosen.set_default("ksp_type", "minres");
+        let names = ["ksp_type", "pc_type", "none"];
+        assert_eq!(names.map(|name| chosen.get(name)), [Some("cg"), Some("hypre"), None]);
+        assert_eq!(names.map(|name| chosen.typed(name)), [Some("cg"), None, None]);
+        assert!(chosen.defaults().eq([("pc_type", "hypre")]));
+        assert_eq!(["ksp_type", "pc_type"].map(|name| typed.of("b_1").get(name).is_some()), [false, true]);
+        let plain = typed.of("c");
+        assert_eq!(["ksp_type", "PC_type"].map(|name| plain.get(name)), [Some("gmres"), Some("lu")]);
+        assert_eq!(["b", "b_1", "c"].map(|name| typed.of(name).prefix().to_owned()), ["b_", "b_1_", ""]);
+        assert!(chosen.has_own() && !plain.has_own() && plain.has_typed_of("pc_"));
     }
 
     /// Options that look and controls of MUMPS leave the choice of the solver to the program.

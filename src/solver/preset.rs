@@ -41,9 +41,8 @@ pub enum Smoother {
     /// Symmetric Gauss-Seidel, which converges for every matrix that is symmetric and positive definite.
     GaussSeidel,
     /// Chebyshev's method, for rows on several ranks. Gauss-Seidel within each rank takes steps that are twice too
-    /// long, or more, at the borders between ranks. Its preconditioner was not positive definite for two spheres of 74
-    /// 799 dofs on three ranks. Steps of Chebyshev's method do not depend on the ranks, and take 1.2 to 1.4 times as
-    /// long on one rank.
+    /// long, or more, at the borders between ranks, so that its preconditioner may not be positive definite. Steps of
+    /// Chebyshev's method do not depend on the ranks, and take 1.2 to 1.4 times as long on one rank.
     Chebyshev,
 }
 

@@ -383,7 +383,7 @@ fn node_sets_are_surfaces() {
     is_ten(run, &["node set `n2`", "1 of its 5 nodes"], "a node too many");
 }
 
-/// Gmsh writes the groups of surfaces as plane triangles, and those of curves as trusses.
+/// Gmsh writes the groups of surfaces as plane triangles, and those of curves as trusses. `winkler mesh` writes what it reads.
 #[test]
 fn input_files_of_gmsh() {
     for order in ["1", "2"] {
@@ -391,9 +391,17 @@ fn input_files_of_gmsh() {
         // The nodes of a set include those in the middle of edges, of which a scene of order 1 has none.
         let text = String::from_utf8(text).expect("text") + "*NSET, NSET=HELD, ELSET=LOWER_BOTTOM\n";
         let names = Names { surfaces: ["held", "lower_top", "upper_bottom", "upper_top"], ..NAMED };
-        let run = solved("a.inp", text.as_bytes(), "\"a.inp\"", &names).converged();
-        assert!((run.number("pairs/0/force/0/2") + 10.0).abs() < 1e-9, "{order}: {}", run.said());
-        assert!(run.warnings().is_empty(), "{order}: {}", run.warnings());
+        // the same as a mesh that the program has written
+        let folder = tempfile::tempdir().expect("a folder");
+        let [deck, mesh] = ["a.inp", "b.msh"].map(|name| folder.path().join(name));
+        fs::write(&deck, &text).expect("a file");
+        let written = winkler(&["mesh", deck.to_str().expect("a path"), "-o", mesh.to_str().expect("a path")]);
+        let bytes = fs::read(&mesh).unwrap_or_else(|_| panic!("{}", written.said()));
+        for (name, bytes) in [("a.inp", text.as_bytes()), ("b.msh", &bytes)] {
+            let run = solved(name, bytes, &format!("\"{name}\""), &names).converged();
+            assert!((run.number("pairs/0/force/0/2") + 10.0).abs() < 1e-9, "{order}: {}", run.said());
+            assert!(run.warnings().is_empty(), "{order}: {}", run.warnings());
+        }
     }
 }
 

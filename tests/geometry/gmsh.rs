@@ -27,7 +27,7 @@ fn files(run: &Run) -> Vec<String> {
 /// Two bodies and their contact surface: all nodes and cells, and the ends of each field.
 #[test]
 fn gmsh_opens_bodies_and_contact_surfaces_with_their_fields() {
-    for (name, order) in [("groove", 1), ("groove", 2), ("patch-3d", 1), ("patch-3d", 2)] {
+    for (name, order) in [("groove", 1), ("groove", 2), ("groove", 8), ("patch-3d", 1), ("patch-3d", 2)] {
         let orders = [0, 1].map(|body| format!("body.{body}.order={order}"));
         let mut words = vec!["--msh", "--vtu", "--set", "method={}", "--set", &orders[0], "--set", &orders[1]];
         if name == "groove" {
@@ -43,6 +43,10 @@ fn gmsh_opens_bodies_and_contact_surfaces_with_their_fields() {
         assert_eq!((views, found.len()), (3 + 3 + 6, 2 + 2 * views), "{found:?}");
         let nodes = |body: usize| run.report["bodies"][body]["nodes"].as_f64().expect("a number");
         assert!(found[1] > nodes(0) + nodes(1), "nodes of all files: {}", found[1]);
+        // between the points of high orders Gmsh finds other ends
+        if order > 2 {
+            continue;
+        }
         let ends = |view: usize| [found[2 + 2 * view], found[3 + 2 * view]];
         // files by name: contact surface, then bodies in the order of their names
         assert!(files[0].starts_with("contact-") && files[1] == "lower.msh", "{files:?}");

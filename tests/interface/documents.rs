@@ -172,7 +172,7 @@ fn links_lead_somewhere() {
 /// A page that the sources name, for readers of a message or a comment, exists.
 #[test]
 fn pages_that_sources_name_exist() {
-    let mut folders = ["src", "scripts", "tests"].map(|name| root().join(name)).to_vec();
+    let mut folders = ["src", "examples", "scripts", "tests"].map(|name| root().join(name)).to_vec();
     let mut lost = Vec::new();
     while let Some(folder) = folders.pop() {
         for path in fs::read_dir(&folder).expect("a folder").flatten().map(|entry| entry.path()) {

@@ -6,13 +6,13 @@ use std::process::Command;
 use std::time::Duration;
 use winkler::api::*;
 
-#[path = "../../scripts/library/gamma.rs"]
+#[path = "../../examples/gamma.rs"]
 #[allow(dead_code)]
 mod gamma;
-#[path = "../../scripts/library/gmsh.rs"]
+#[path = "../../examples/gmsh.rs"]
 #[allow(dead_code)]
 mod gmsh;
-#[path = "../../scripts/library/law.rs"]
+#[path = "../../examples/law.rs"]
 #[allow(dead_code)]
 mod law;
 

@@ -30,11 +30,15 @@ fn options_reach_all_bodies_or_one() {
         ("-pc_type lu -pc_factor_mat_solver_type petsc", ["preonly + lu by petsc"; 2]),
         ("-upper_pc_type cholesky", ["condensed to 32 dofs by mumps", "preonly + cholesky by mumps"]),
         ("-upper_ksp_type cg -lower_pc_type gamg", ["cg + gamg", "cg + cholesky by mumps"]),
-        ("-ksp_type cg -pc_type hypre -upper_pc_type jacobi -lower_ksp_type gmres", ["gmres + hypre", "cg + jacobi"]),
+        // what the program chooses for one body does not reach another one
         (
-            "-upper_ksp_type preonly -upper_pc_type cholesky -pc_type hypre -ksp_type fcg",
-            ["fcg + hypre", "preonly + cholesky by mumps"],
+            "--method robin --set solver=hypre --set body.0.order=1 --set body.1.order=2 -mg_levels_ksp_max_it 2",
+            ["cg + hypre", "cg + mg by hypre"],
         ),
+        // a body with options of its own has these alone
+        ("-ksp_type fcg -pc_type hypre -upper_pc_type jacobi", ["fcg + hypre", "cg + jacobi"]),
+        ("-ksp_type fcg -pc_type hypre -lower_ksp_type gmres", ["gmres + cholesky by mumps", "fcg + hypre"]),
+        ("-pc_type hypre -UPPER_pc_type icc -upper_pc_factor_levels 2", ["cg + hypre", "cg + icc by petsc"]),
     ];
     for (options, solvers) in cases {
         let run = groove(options).converged();
@@ -73,6 +77,10 @@ fn a_file_of_options_is_read() {
     assert_eq!(groove(&format!("-options_file {path}")).converged().solvers(), ["cg + hypre", "cg + gamg"]);
     let run = groove(&format!("-options_file {path} -lower_pc_type jacobi")).converged();
     assert_eq!(run.solvers(), ["cg + jacobi", "cg + gamg"]);
+    // no body is left for these
+    for option in ["-ksp_type", "-pc_type"] {
+        assert!(run.warnings().contains(&format!("{option} was not used")), "{}", run.warnings());
+    }
     let run = groove("-options_file missing.opts");
     assert_eq!(run.code, 5, "{}", run.said());
     assert!(run.stderr.contains("missing.opts"), "{}", run.stderr);
@@ -91,23 +99,25 @@ fn a_good_option_of_a_solver_not_in_use_is_a_warning() {
     // capitals are those of PETSc
     let own = groove("-KSP_Type cg -pc_type gamg -upper_pc_type icc").converged();
     assert_eq!((own.warnings(), own.solvers()), (String::new(), vec!["cg + gamg", "cg + icc by petsc"]));
-    // it is in use in one body of two
-    assert_eq!(groove("-pc_gamg_threshold 0.1 -lower_pc_type gamg").converged().warnings(), "");
-    let run =
-        solve_on(2, case("groove"), &[&SCENE[..], &["-pc_gamg_threshold", "0.1", "-upper_pc_type", "gamg"]].concat());
-    assert_eq!(run.converged().warnings(), "");
+    // it is in use in one body of two, or of another rank
+    assert_eq!(groove("-pc_gamg_threshold 0.1 -pc_type gamg -lower_pc_type icc").converged().warnings(), "");
+    let upper = ["-upper_pc_type", "gamg", "-upper_pc_gamg_threshold", "0.1"];
+    assert_eq!(solve_on(2, case("groove"), &[&SCENE[..], &upper].concat()).converged().warnings(), "");
+    // a body with options of its own does not read it
+    let apart = groove("-pc_gamg_threshold 0.1 -lower_pc_type gamg").converged();
+    assert!(apart.warnings().contains("-pc_gamg_threshold was not used"), "{}", apart.warnings());
 }
 
 #[test]
 fn petsc_prints_what_it_is_asked_for() {
     let monitor = groove("-ksp_type cg -ksp_monitor").converged();
     assert!(monitor.stdout.contains("KSP Residual norm"), "{}", monitor.stdout);
-    let one = groove("-ksp_type cg -upper_ksp_monitor").converged();
+    let one = groove("-ksp_type cg -upper_ksp_type cg -upper_ksp_monitor").converged();
     let count = |run: &Run| run.stdout.matches("KSP Residual norm").count();
     assert!(count(&one) > 0 && 2 * count(&one) <= count(&monitor) + 4, "{}", one.stdout);
     let view = groove("-ksp_view -ksp_type preonly").converged();
     assert!(
-        view.stdout.contains("KSP Object: upper (cholesky_bodies_)") && view.stdout.contains("mumps"),
+        view.stdout.contains("KSP Object: upper 1 MPI process") && view.stdout.contains("mumps"),
         "{}",
         view.stdout
     );
@@ -118,7 +128,7 @@ fn petsc_prints_what_it_is_asked_for() {
     let log = groove("-log_view").converged();
     assert!(log.stdout.contains("Performance Summary") || log.stdout.contains("MatCholFctrNum"), "{}", log.stdout);
     let reason = groove("-ksp_type cg -ksp_converged_reason").converged();
-    assert!(reason.stdout.contains("Linear cholesky_bodies_ solve converged"), "{}", reason.stdout);
+    assert!(reason.stdout.contains("Linear solve converged"), "{}", reason.stdout);
     let help = groove("-help");
     assert_eq!(help.code, 0, "{}", help.stderr);
     assert!(help.stdout.contains("ksp_type") && help.stdout.contains("-log_view"), "{}", help.stdout);
@@ -323,13 +333,13 @@ fn multigrid_of_quadratic_elements_has_two_levels() {
 #[test]
 fn a_solver_without_iterations_is_refused() {
     for (options, named) in [
-        ("--method newton --set solver=hypre -ksp_max_it 0", "-newton_ksp_max_it is 0"),
+        ("--method newton --set solver=hypre -ksp_max_it 0", "-ksp_max_it is 0"),
         ("--method newton -newton_pc_type hypre -newton_ksp_max_it 0", "-newton_ksp_max_it is 0"),
-        ("--method newton-robin --set solver=hypre -ksp_max_it -1", "_ksp_max_it is -1"),
-        ("--set solver=icc -ksp_max_it 0", "_ksp_max_it is 0"),
-        ("-ksp_type gmres -pc_type jacobi -ksp_max_it 0", "_ksp_max_it is 0"),
-        ("-pc_type gamg -upper_ksp_max_it 0", "-upper_ksp_max_it is 0"),
-        ("-pc_type gamg -pc_gamg_esteig_ksp_max_it 0", "_pc_gamg_esteig_ksp_max_it is 0"),
+        ("--method newton-robin --set solver=hypre -ksp_max_it -1", "-ksp_max_it is -1"),
+        ("--set solver=icc -ksp_max_it 0", "-ksp_max_it is 0"),
+        ("-ksp_type gmres -pc_type jacobi -ksp_max_it 0", "-ksp_max_it is 0"),
+        ("-upper_pc_type gamg -upper_ksp_max_it 0", "-upper_ksp_max_it is 0"),
+        ("-pc_type gamg -pc_gamg_esteig_ksp_max_it 0", "-pc_gamg_esteig_ksp_max_it is 0"),
     ] {
         let run = groove(options);
         assert_eq!(run.code, 5, "{options}: {}", run.said());

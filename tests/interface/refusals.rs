@@ -418,7 +418,7 @@ fn a_start_so_large_that_the_law_overflows() {
 
 #[test]
 fn an_inner_solver_that_gives_up() {
-    let options = ["-ksp_type", "cg", "-pc_type", "none", "-upper_ksp_max_it", "2"];
+    let options = ["-upper_ksp_type", "cg", "-upper_pc_type", "none", "-upper_ksp_max_it", "2"];
     let run = solve(case("groove"), &[&COARSE[..], &options].concat());
     failed(&run, &["inner-solver"], &["`upper`", "iteration 0"]);
 }
@@ -473,7 +473,7 @@ fn two_ranks_refuse_as_one() {
         refused(&solve_on(2, case("groove"), options), code, words);
     }
     failed(&solve_on(2, pushed_aside(), &[]), &["underconstrained"], &["`upper`", "translation along x"]);
-    let options = ["-ksp_type", "cg", "-pc_type", "none", "-upper_ksp_max_it", "2"];
+    let options = ["-upper_ksp_type", "cg", "-upper_pc_type", "none", "-upper_ksp_max_it", "2"];
     let run = solve_on(2, case("groove"), &[&COARSE[..], &options].concat());
     failed(&run, &["inner-solver"], &["`upper`", "iteration 0"]);
 }

@@ -3,7 +3,7 @@
 use crate::common::{Run, case, solve, winkler};
 use std::fs;
 
-/// Courses, and bricks of a course. PETSc's table of options has room for 42 bodies with hypre.
+/// Courses, and bricks of a course. PETSc's table of options has no room for hypre's defaults of each brick.
 const SIDE: usize = 7;
 
 /// Bodies of that wall.
@@ -27,7 +27,7 @@ fn robin(more: &[&str]) -> Run {
     run
 }
 
-/// However many bodies there are, each has its solver, its own options win over those of all, and these over the program's; PETSc's
+/// However many bodies there are, each has its solver. Its own options replace those of all, and both win over the program's; PETSc's
 /// table has what was typed and no more, and all of it was read.
 #[test]
 fn every_body_has_its_options() {

@@ -1,7 +1,7 @@
 //! The error of a contact pressure, against the tables of another run or against the closed form of the scene.
 
-use crate::commands::interpolate::{EXACT, PointTree, Squares, mean};
 use crate::error::{Error, Kind, Result};
+use crate::estimate::interpolate::{EXACT, PointTree, Squares, mean};
 use crate::linalg::{bounds, length, minus};
 use crate::scene::Scene;
 use serde::Deserialize;

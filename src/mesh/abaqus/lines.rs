@@ -2,7 +2,7 @@
 
 use super::frame::{Coordinates, real};
 use crate::error::{Error, Result};
-use crate::file::{read, with_unix_lines};
+use crate::file::read;
 use std::path::{Path, PathBuf};
 
 /// Files that may stand in each other by `*INCLUDE`. More are taken for a file that includes itself.
@@ -74,7 +74,7 @@ impl LineReader {
                 .because(error.message().to_owned())
                 .help("names of files are relative to the folder of the file that includes them")
         })?;
-        self.push(path, &with_unix_lines(bytes));
+        self.push(path, &bytes);
         Ok(())
     }
 

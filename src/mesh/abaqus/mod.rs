@@ -1,4 +1,4 @@
-//! Input files of Abaqus and CalculiX (`.inp`) in Gmsh's format 2.2: nodes, elements, and named sets.
+//! A reader of input files of Abaqus and CalculiX (`.inp`): nodes, elements, and named sets.
 //!
 //! Element sets become groups of cells. Sets of shells, membranes and trusses become the groups of facets or edges of
 //! cells that these lie on. Surfaces are groups of facets, and node sets groups of points. Instances of parts are
@@ -9,8 +9,9 @@ mod lines;
 mod model;
 mod read;
 
-use super::msh2::Contents;
-use super::simplex;
+use super::builder::{MeshBuilder, MeshProducer, kind_of};
+use super::scan::Flaw;
+use super::{Mesh, simplex};
 use crate::error::{Error, Result};
 use lines::LineReader;
 use model::{AbaqusElement, AbaqusModel, AbaqusType, ElementFace, MissingMember, members};
@@ -18,54 +19,51 @@ use read::Reader;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::path::Path;
 
-/// A converted file.
-pub struct Converted {
-    /// The bytes of the mesh in Gmsh's format 2.2.
-    pub mesh: Vec<u8>,
-    /// What the user should know of it, in sentences without a full stop.
-    pub notes: Vec<String>,
-}
-
-/// Convert a file for a scene of this dimension.
+/// Read a file for a scene in `D` dimensions. Return the mesh, and what the user should know of it, in sentences without
+/// a full stop.
 ///
 /// # Errors
 /// A line is not one of Abaqus or CalculiX. The file has no cells, or solids of other kinds. A set has members that do
 /// not exist. Errors name the line.
-pub fn convert(path: &Path, bytes: &[u8], dimension: usize) -> Result<Converted> {
+pub fn read<const D: usize>(path: &Path, bytes: &[u8]) -> Result<(Mesh<D>, Vec<String>)> {
     let reader = Reader::read(path, bytes)?;
     let help = "an input file of Abaqus or CalculiX has them under *NODE and *ELEMENT";
     if reader.model.nodes.is_empty() || reader.model.elements.is_empty() {
         return Err(Error::mesh(path, None, "this file has no nodes or no elements").help(help));
     }
-    let groups = GroupBuilder::new(&reader.model, &reader.lines, dimension)?;
+    let groups = GroupBuilder::new(&reader.model, &reader.lines, D)?;
     groups.check_nodes()?;
-    if !groups.list.iter().any(|group| group.dimension >= dimension) {
+    if !groups.list.iter().any(|group| group.dimension >= D) {
         let types: Vec<&str> = groups.left_out.elements.keys().map(String::as_str).collect();
-        let message = format!("this file has no cells of bodies in dimension {dimension}, only {}", types.join(", "));
-        let help = if dimension == 3 { "for plane elements set `dimension = 2`" } else { help };
+        let message = format!("this file has no cells of bodies in dimension {D}, only {}", types.join(", "));
+        let help = if D == 3 { "for plane elements set `dimension = 2`" } else { help };
         return Err(Error::mesh(path, None, message).help(help));
     }
-    Ok(Converted {
-        mesh: contents(&reader.model, &groups.list).written().into_bytes(),
-        notes: notes(path, &reader, &groups.left_out),
-    })
+    let mesh = build(&reader.model, &groups.list);
+    let mesh = mesh.map_err(|Flaw { what, help }| Error::mesh(path, None, what).help(help))?;
+    Ok((mesh.finish(path)?, notes(path, &reader, &groups.left_out)))
 }
 
-/// Return the mesh. Each group is a physical one on an entity of its own, so that an element of several groups is
-/// written once for each.
-fn contents(model: &AbaqusModel, groups: &[ElementGroup]) -> Contents {
-    let mut contents =
-        Contents { nodes: model.nodes.iter().map(|(tag, node)| (*tag, node.x)).collect(), ..Contents::default() };
-    for (tag, ElementGroup { dimension, name, elements, points }) in (1..).zip(groups) {
-        contents.groups.push((*dimension, name.clone()));
-        let mut add =
-            |number: u64, kind: i32, nodes: &[u64]| contents.elements.push((number, kind, tag, nodes.to_vec()));
+/// Give a mesh the nodes, groups and elements. An element of several groups is added to each of them.
+fn build<const D: usize>(model: &AbaqusModel, groups: &[ElementGroup]) -> std::result::Result<MeshBuilder<D>, Flaw> {
+    let mut mesh = MeshBuilder::new(MeshProducer::Other);
+    let tagged = || (1..).zip(groups);
+    tagged().try_for_each(|(tag, group)| mesh.name(group.dimension, tag, &group.name))?;
+    model.nodes.iter().try_for_each(|(tag, node)| mesh.node(*tag, node.x))?;
+    mesh.number_nodes()?;
+    for (tag, ElementGroup { dimension, elements, points, .. }) in tagged() {
+        let own = [mesh.group(*dimension, tag)?];
+        let mut add = |number: u64, kind: i32, nodes: &[u64]| {
+            let kind = kind_of(kind)?;
+            mesh.check_type(kind, &own)?;
+            mesh.element(kind, number, nodes, &own)
+        };
         for (number, (kind, nodes)) in elements {
-            add(*number, simplex::ElementType::number(kind.shape, kind.nodes()), nodes);
+            add(*number, simplex::ElementType::number(kind.shape, kind.nodes()), nodes)?;
         }
-        points.iter().for_each(|node| add(*node, simplex::POINTS, &[*node]));
+        points.iter().try_for_each(|node| add(*node, simplex::POINTS, &[*node]))?;
     }
-    contents
+    Ok(mesh)
 }
 
 /// Return what was left out, or is not as the user may think.

@@ -1,6 +1,6 @@
 //! The check that the cells of a body are a mesh of it, one file a question.
 //!
-//! 1. Cells have positive volume. Straight cells have it since they were read; curved ones are checked ([`curved`]).
+//! 1. Each node inside an edge serves one edge ([`curved`]). Cells have positive volume since the mesh was read.
 //! 2. At most two cells share a facet, from its two sides, with the same mid-edge nodes ([`faces`]).
 //! 3. No node of the boundary lies on a facet to which it does not belong, which would leave a crack ([`boundary`]).
 //! 4. Cells join through facets, not by an edge or a corner alone ([`parts`]).

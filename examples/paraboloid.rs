@@ -3,7 +3,7 @@
 //!
 //! cargo run --release --example paraboloid > meshes/paraboloid/depth.txt
 
-#[path = "../../tests/common/series.rs"]
+#[path = "../tests/common/series.rs"]
 #[allow(dead_code, reason = "tests use the rest")]
 mod series;
 

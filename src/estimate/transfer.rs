@@ -70,6 +70,11 @@ impl EstimatedSolution {
         }
     }
 
+    /// Return the solution, one table for each pair.
+    pub fn tables(&self) -> &[ContactTable] {
+        &self.tables
+    }
+
     /// Correct the estimate of the next mesh, whose solution is `tables`, by the difference of both solutions.
     ///
     /// If the error e of the next mesh and the error e' of this mesh are right, the solutions differ by e + e' at most.
