@@ -6,6 +6,7 @@ use super::post::FemBody;
 use super::scene_body::{SceneBody, elasticity_of};
 use crate::error::Result;
 use crate::exchange::Plain;
+use crate::fem::assemble::InitialLoad;
 use crate::fem::rigid;
 use crate::fem::{ElasticBody, Prolongation};
 use crate::linalg::Csr;
@@ -65,7 +66,8 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
         let mut part = SceneBody { spec, elasticity: Rc::new(elasticity), mesh };
         let own = part.mesh.own_nodes();
         if part.mesh.is_owned {
-            self.give_solver(&mut part, before, slot, info.rank)?;
+            let initial = part.initial_load(self.mesh, &own)?;
+            self.give_solver(&mut part, &initial, before, slot, info.rank)?;
         }
         let SceneBody { elasticity, mesh, .. } = part;
         let (name, exact, supports) = (info.name.clone(), spec.exact.clone(), spec.fix.len());
@@ -84,19 +86,20 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
     fn give_solver(
         &mut self,
         part: &mut SceneBody<D>,
+        initial: &InitialLoad,
         before: EarlierBody,
         slot: &mut BodySlot,
         owner: usize,
     ) -> Result<()> {
         let (load, is_owner) = (part.mesh.load_vector(), owner == self.rank);
         if let Some((mut body, BodySlot { scale, row_stiffness, .. })) = before.serving {
-            body.reload(load, part.mesh.prescribed())?;
+            body.reload(load, initial, part.mesh.prescribed())?;
             (slot.local, slot.scale, slot.row_stiffness) = (Some(body), scale, row_stiffness);
             // the sums of all ranks are known
             slot.row_stiffness.iter_mut().filter(|_| !is_owner).for_each(|stiffness| *stiffness = 0.0);
         } else {
             self.assemblies += usize::from(is_owner);
-            self.assemble(part, load, slot)?;
+            self.assemble(part, load, initial, slot)?;
             slot.local.iter_mut().for_each(|body| body.count_on(before.counts));
         }
         slot.scale = if is_owner { slot.scale } else { 0.0 };
@@ -105,7 +108,13 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
 
     /// Assemble the matrix of a body, all of it or the rows of this rank, and make its solver, which takes the contact
     /// rows.
-    fn assemble(&mut self, part: &mut SceneBody<D>, load: Vec<f64>, slot: &mut BodySlot) -> Result<()> {
+    fn assemble(
+        &mut self,
+        part: &mut SceneBody<D>,
+        load: Vec<f64>,
+        initial: &InitialLoad,
+        slot: &mut BodySlot,
+    ) -> Result<()> {
         let prescribed = part.mesh.prescribed();
         let modes = part.mesh.unconstrained_modes.iter();
         let mut unconstrained_modes: Vec<Vec<f64>> = modes.map(|motion| part.mesh.dofs_of(motion)).collect();
@@ -116,7 +125,7 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
         if let Some(owned) = &owned {
             graph = graph.of(|node| owned.is_own::<D>(node));
         }
-        let mut body = part.assemble(self.mesh, &graph, load, prescribed)?;
+        let mut body = part.assemble(self.mesh, &graph, load, initial, prescribed)?;
         drop(graph);
         slot.scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
         slot.row_stiffness = rows.quadratic_diagonal(&body.stiffness);

@@ -7,13 +7,14 @@ use super::verify::Verified;
 use crate::contact::Side;
 use crate::error::{Error, Result, shown};
 use crate::expression::Field;
+use crate::fem::assemble::{Defect, InitialLoad};
 use crate::fem::elasticity::Flaw;
 use crate::fem::{
     ElasticBody, Elasticity, Facets, NodalForces, NodeGraph, PointExtent, Space, assemble, support, surface,
 };
 use crate::linalg::{Csr, Total, countable};
 use crate::mesh::{self, Group, Mesh};
-use crate::problem::{BodySpec, Constants, ElasticitySpec, Order, Plane};
+use crate::problem::{BodySpec, Constants, ElasticitySpec, OneOrVector, Order, Plane};
 use crate::problem::{Load, LoadKind};
 use crate::scene::Scene;
 use std::cell::OnceCell;
@@ -168,19 +169,13 @@ impl<'a, const D: usize> SceneBody<'a, D> {
         mesh: &Mesh<D>,
         graph: &NodeGraph,
         mut load: Vec<f64>,
+        initial: &InitialLoad,
         prescribed: Vec<(usize, f64)>,
     ) -> Result<ElasticBody> {
         let name = &self.spec.name;
         countable(&format!("the stiffness matrix of body `{}`", name.value), graph.entries::<D>())?;
         let mut stiffness = assemble::stiffness(&self.mesh.space, graph, &self.mesh.held.frame, &self.elasticity)
-            .map_err(|defect| match defect {
-                assemble::Defect::Inverted(cell) => {
-                    let corner = self.mesh.space.in_scene(self.mesh.space.cell_nodes(cell)[0]);
-                    let message = format!("body `{}`: the curved cell at {} is folded", name.value, point(corner));
-                    Error::mesh(&mesh.path, None, message).help("refine the mesh there, or use order = 1")
-                }
-                assemble::Defect::Elasticity(number, x, flaw) => refusal(self.spec, number, Some(x), &flaw),
-            })?;
+            .map_err(|defect| self.refusal(mesh, defect))?;
         if (0..stiffness.rows()).any(|row| stiffness.row(row).any(|(_, k)| !k.is_finite())) {
             let message = format!("body `{}`: its stiffness is beyond the range of numbers", name.value);
             return Err(Error::scene(&self.spec.elasticity().place, message).label("far too large"));
@@ -189,7 +184,38 @@ impl<'a, const D: usize> SceneBody<'a, D> {
         self.mesh.springs.iter().for_each(|springs| assemble::add_blocks(graph, frame, springs, &mut stiffness));
         // These rows belong to other ranks.
         (0..load.len()).filter(|&i| stiffness.range(i).is_empty()).for_each(|i| load[i] = 0.0);
-        Ok(support(stiffness, load, prescribed))
+        Ok(support(stiffness, load, initial, prescribed))
+    }
+
+    /// Return the load of the initial strains at all dofs. Rows of nodes that `own` lacks are not complete, and cells whose
+    /// first node it lacks have no energy.
+    ///
+    /// # Errors
+    /// A temperature or an expansion is not finite somewhere.
+    pub fn initial_load(&self, mesh: &Mesh<D>, own: &[bool]) -> Result<InitialLoad> {
+        let counts = |cell: &[u32]| cell.iter().min().is_some_and(|&first| own[first as usize]);
+        let mut load = assemble::initial_load(&self.mesh.space, &self.elasticity, counts)
+            .map_err(|defect| self.refusal(mesh, defect))?;
+        if !load.force.iter().all(|force| force.is_finite()) {
+            return Err(too_large(self.spec));
+        }
+        if !load.force.is_empty() {
+            self.mesh.held.frame.forces(&mut load.force);
+        }
+        Ok(load)
+    }
+
+    /// Return the error of a body that cannot be assembled.
+    fn refusal(&self, mesh: &Mesh<D>, defect: Defect) -> Error {
+        match defect {
+            Defect::Inverted(cell) => {
+                let corner = self.mesh.space.in_scene(self.mesh.space.cell_nodes(cell)[0]);
+                let name = &self.spec.name.value;
+                let message = format!("body `{name}`: the curved cell at {} is folded", point(corner));
+                Error::mesh(&mesh.path, None, message).help("refine the mesh there, or use order = 1")
+            }
+            Defect::Elasticity(number, x, flaw) => refusal(self.spec, number, Some(x), &flaw),
+        }
     }
 }
 
@@ -335,7 +361,12 @@ fn elasticity<const D: usize>(spec: &BodySpec, space: &Space<D>, mesh: &Mesh<D>,
 pub fn elasticity_of(spec: &BodySpec, of_cell: Vec<usize>, dimension: usize, plane: Plane) -> Result<Elasticity> {
     let constants: Vec<ElasticitySpec> = constants(spec).collect();
     let constants: Vec<&ElasticitySpec> = constants.iter().collect();
-    Elasticity::new(&constants, of_cell, dimension, plane).map_err(|(number, flaw)| refusal(spec, number, None, &flaw))
+    let elasticity = Elasticity::new(&constants, of_cell, dimension, plane)
+        .map_err(|(number, flaw)| refusal(spec, number, None, &flaw))?;
+    Ok(match &spec.temperature {
+        Some(temperature) => elasticity.heated(temperature.value.clone(), spec.heat_factor),
+        None => elasticity,
+    })
 }
 
 /// Return the constants of a body and of its regions.
@@ -348,7 +379,9 @@ fn constants(spec: &BodySpec) -> impl Iterator<Item = ElasticitySpec> {
 fn refusal(spec: &BodySpec, number: usize, x: Option<[f64; 3]>, flaw: &Flaw) -> Error {
     let elasticity = constants(spec).nth(number).unwrap_or_else(|| spec.elasticity());
     let place = &elasticity.place;
-    let fields = elasticity.fields();
+    let temperature = spec.temperature.iter().map(|temperature| ("temperature", &temperature.value));
+    let expansion = elasticity.expansion.iter().flat_map(OneOrVector::fields).map(|field| ("expansion", field));
+    let fields: Vec<_> = elasticity.fields().into_iter().chain(temperature).chain(expansion).collect();
     // A value that does not exist causes every other flaw, so it is reported first.
     if let Some(error) = x.and_then(|x| fields.iter().find_map(|(name, field)| field.eval_finite(name, x).err())) {
         return error.because(of_body(&spec.name.value));

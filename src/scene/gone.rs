@@ -16,7 +16,6 @@ const KEYS: &[(&str, &str, &str)] = &[
     ),
     ("density", "body", "give a weight as force = [0, 0, -DENSITY*GRAVITY], a force a unit of volume"),
     ("depth", "method", "the method `anderson`, which had it, is gone"),
-    ("expansion", "body", HEAT),
     ("fill", "data", HEIGHTS),
     (
         "friction",
@@ -33,8 +32,8 @@ const KEYS: &[(&str, &str, &str)] = &[
     ("points", "data", HEIGHTS),
     ("shear", "contact", "a layer carries normal forces alone"),
     ("spectral", "method", "gamma = \"aitken\" or \"line-search\""),
-    ("temperature", "body", HEAT),
-    ("thermal_expansion", "body", HEAT),
+    ("temperature", "contact", "temperature = T belongs to a body, with expansion = ALPHA"),
+    ("thermal_expansion", "body", "expansion = ALPHA, with temperature = T"),
     ("yield", "body", "bodies are linearly elastic: compare the largest von Mises stress with the yield stress"),
 ];
 
@@ -59,9 +58,6 @@ pub const OPTIONS: &[(&str, &str)] = &[
     ),
     ("report", "`winkler solve --report` writes the page of a run"),
 ];
-
-/// Advice for heat.
-const HEAT: &str = "heat is not computed: a uniform change of temperature between bodies may be given as a `gap`";
 
 /// Advice for methods over the sweep.
 const SWEEPS: &str = "name = \"auto\", or \"robin\" with gamma = \"aitken\"";

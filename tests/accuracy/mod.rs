@@ -4,6 +4,7 @@ mod axisymmetric;
 mod bonds;
 mod cases;
 mod elasticity;
+mod heat;
 mod layers;
 mod manufactured;
 mod obstacles;
