@@ -67,6 +67,7 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
         let own = part.mesh.own_nodes();
         if part.mesh.is_owned {
             let initial = part.initial_load(self.mesh, &own)?;
+            slot.heat = initial.energy;
             self.give_solver(&mut part, &initial, before, slot, info.rank)?;
         }
         let SceneBody { elasticity, mesh, .. } = part;

@@ -80,6 +80,7 @@ impl<const D: usize> WholeBody<'_, D> {
             modulus,
             depth,
             row_stiffness: Vec::new(),
+            heat: 0.0,
             imposed: self.trace(&self.part.mesh.imposed_motion(&self.rigid_modes)),
         };
         (slot, self.info(checked, plane))
