@@ -71,7 +71,7 @@ fn pair_to_json(built: &Built, i: usize) -> Value {
     let [low, high] = range(pair.gap.iter().copied());
     json!({
         "surfaces": built.discrete.surfaces(i),
-        "contact": built.discrete.specs[i].table,
+        "contact": built.discrete.specs[i].in_file(),
         "carrier": pair.surfaces[0],
         "points": pair.len(),
         "length": pair.area.iter().sum::<f64>(),

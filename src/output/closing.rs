@@ -235,6 +235,16 @@ fn largest(displacement: Option<f64>, von_mises: Option<f64>, place: &str, units
 fn pair_line(pair: &PairReport, is_bonded: bool, units: &UnitWords) -> String {
     let ([a, b], on) = (&pair.surfaces, &pair.bodies[0]);
     let is_pulled = pair.tension.is_some_and(|tension| tension.peak_tension > 0.0);
+    if pair.shear {
+        let TensionReport { peak_tension, peak_stretch, .. } = pair.tension.unwrap_or_default();
+        let (traction, slip) = (pair.peak_pressure.max(peak_tension), pair.peak_compression.max(peak_stretch));
+        let sum = units.vector(pair.force[0], traction * pair.extent.contact());
+        let (traction, slip) = (readable(traction, 6), sci(slip, 3));
+        let UnitWords { stress, force, length, .. } = units;
+        return format!(
+            "  {a} - {b}: shear force on `{on}` {sum}{force}, traction up to {traction}{stress}, slip up to {slip}{length}"
+        );
+    }
     if pair.peak_pressure <= 0.0 && !is_pulled || pair.peak_pressure.is_nan() {
         return format!("  {a} - {b}: no contact");
     }

@@ -323,6 +323,9 @@ pub struct PairReport {
     /// Closing of the gap (a length) that was found for the force or preload of the pair.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub offset: Option<f64>,
+    /// True for the shear of a bond: pressures are tractions along the surface, and compressions slips.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub shear: bool,
 }
 
 /// The tension of a bonded layer.

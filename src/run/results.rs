@@ -209,7 +209,8 @@ pub fn pair_names(built: &Built) -> Vec<String> {
     let model = &built.discrete.model;
     let names = (0..model.pairs.len()).map(|i| {
         let [a, b] = built.discrete.sides(i).map(|side| &model.bodies[model.pairs[i].bodies[side]].name);
-        format!("{a}-{b}")
+        let slip = if built.discrete.specs[i].slip.is_some() { "-shear" } else { "" };
+        format!("{a}-{b}{slip}")
     });
     numbered(names)
 }

@@ -20,7 +20,7 @@ const KEYS: &[(&str, &str, &str)] = &[
     (
         "friction",
         "contact",
-        "contact is without friction: surfaces slide freely, and a bond carries normal forces alone",
+        "contact is without friction: surfaces slide freely, and bond = true with shear = K is glue that does not slip",
     ),
     ("memory", "mesh", "Gmsh has `timeout` alone; the shell limits memory: ulimit -v"),
     ("missing", "data", HEIGHTS),
@@ -30,7 +30,7 @@ const KEYS: &[(&str, &str, &str)] = &[
     ("parabola", "data", HEIGHTS),
     ("plastic", "body", "bodies are linearly elastic"),
     ("points", "data", HEIGHTS),
-    ("shear", "contact", "a layer carries normal forces alone"),
+    ("shear", "layer", "shear = K stands beside bond = true in [[contact]]"),
     ("spectral", "method", "gamma = \"aitken\" or \"line-search\""),
     ("temperature", "contact", "temperature = T belongs to a body, with expansion = ALPHA"),
     ("thermal_expansion", "body", "expansion = ALPHA, with temperature = T"),

@@ -9,6 +9,7 @@ mod layers;
 mod manufactured;
 mod obstacles;
 mod preloads;
+mod shear;
 mod space;
 mod supports;
 mod turning;
