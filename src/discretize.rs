@@ -219,8 +219,8 @@ impl Discrete {
         self.sides(i).map(|side| self.model.pairs[i].surfaces[side].as_str())
     }
 
-    /// Send every rank what only the owner ranks of a body have: its largest stiffness, the energy of its initial strains,
-    /// and the stiffness at its contact rows. Collective, after all ranks have made their problem.
+    /// Send every rank what only the owner ranks of a body have: its largest stiffness, the energy of its initial
+    /// strains, and the stiffness at its contact rows. Collective, after all ranks have made their problem.
     pub fn share(&mut self) {
         let count = self.model.bodies.len();
         let mut message = vec![0.0; 2 * count + 2 * self.model.points()];

@@ -6,8 +6,8 @@
 //! s = t.(u_a - u_b) - d/2 n.(du_a/dt + du_b/dt)
 //! ```
 //!
-//! The second part is the turn of the surfaces, without which a film between surfaces that are apart would resist a rigid
-//! motion of both bodies together, and its tractions would leave the moment d t unbalanced.
+//! The second part is the turn of the surfaces, without which a film between surfaces that are apart would resist a
+//! rigid motion of both bodies together, and its tractions would leave the moment d t unbalanced.
 
 use super::pair::ContactPair;
 use super::pieces::Intersection;
@@ -28,8 +28,8 @@ pub struct Tangents {
 }
 
 impl Tangents {
-    /// Return the first or second direction along a surface with these normals. It varies smoothly wherever no normal is
-    /// along the axis to which they are least inclined.
+    /// Return the first or second direction along a surface with these normals. It varies smoothly wherever no normal
+    /// is along the axis to which they are least inclined.
     pub fn new(normals: &[[f64; 3]], direction: usize) -> Self {
         let along = |axis: usize| normals.iter().map(|n| n[axis] * n[axis]).sum::<f64>();
         let axis = (0..3).min_by(|&i, &j| along(i).total_cmp(&along(j))).unwrap_or(0);
@@ -51,8 +51,8 @@ impl Tangents {
     }
 }
 
-/// The turns of both surfaces in the slip: rows of `-d/2 n.du/dt` at each integration point, with displacements of nodes
-/// as columns.
+/// The turns of both surfaces in the slip: rows of `-d/2 n.du/dt` at each integration point, with displacements of
+/// nodes as columns.
 #[derive(Serialize, Deserialize)]
 pub struct Turns(pub [Csr; 2]);
 
@@ -111,8 +111,8 @@ impl Turns {
 }
 
 impl ContactPair {
-    /// Let slip along the surface take the place of the compression: the normals become these tangents. `common` has the
-    /// distances of the surfaces. [`ContactPair::hold`] then makes the rows of dofs.
+    /// Let slip along the surface take the place of the compression: the normals become these tangents. `common` has
+    /// the distances of the surfaces. [`ContactPair::hold`] then makes the rows of dofs.
     pub fn slide<const D: usize>(
         &mut self,
         tangents: Tangents,

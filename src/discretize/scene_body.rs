@@ -187,8 +187,8 @@ impl<'a, const D: usize> SceneBody<'a, D> {
         Ok(support(stiffness, load, initial, prescribed))
     }
 
-    /// Return the load of the initial strains at all dofs. Rows of nodes that `own` lacks are not complete, and cells whose
-    /// first node it lacks have no energy.
+    /// Return the load of the initial strains at all dofs. Rows of nodes that `own` lacks are not complete, and cells
+    /// whose first node it lacks have no energy.
     ///
     /// # Errors
     /// A temperature or an expansion is not finite somewhere.

@@ -498,7 +498,8 @@ pub struct InitialLoad {
 /// holds.
 ///
 /// # Errors
-/// [`Defect`]: a cell whose map is not invertible at an integration point, or a point without elasticity or temperature.
+/// [`Defect`]: a cell whose map is not invertible at an integration point, or a point without elasticity or
+/// temperature.
 pub fn initial_load<const D: usize>(
     space: &Space<D>,
     elasticity: &Elasticity,
@@ -590,8 +591,8 @@ impl ElasticBody {
         self.prescribed = prescribed;
     }
 
-    /// Add initial strains to the strain energy u'Ku, which becomes the integral of (eps - eps0) : C (eps - eps0), and to
-    /// the loads of free dofs.
+    /// Add initial strains to the strain energy u'Ku, which becomes the integral of (eps - eps0) : C (eps - eps0), and
+    /// to the loads of free dofs.
     fn add_initial(&mut self, initial: &InitialLoad, prescribed: &[(usize, f64)]) {
         if initial.force.is_empty() {
             return;

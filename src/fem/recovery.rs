@@ -135,8 +135,8 @@ impl<'a, const D: usize> Recovery<'a, D> {
         }
     }
 
-    /// Return the stress (xx yy zz xy yz xz) of a difference of strains in a cell at a point. Assembly evaluated the law
-    /// there, so it has a value.
+    /// Return the stress (xx yy zz xy yz xz) of a difference of strains in a cell at a point. Assembly evaluated the
+    /// law there, so it has a value.
     fn stress(&self, cell: usize, at: [f64; D], strain: &[f64; 6]) -> [f64; 6] {
         let material = self.elasticity.at(cell, self.space.in_scene(at));
         material.map_or([0.0; 6], |material| material.stress(strain))
@@ -162,8 +162,8 @@ impl<'a, const D: usize> Recovery<'a, D> {
     /// The load L of the interpolation error b does the work L(u_h) = eta^2 - f'b on the discrete displacement, except
     /// where the solution is singular. The missing work is done by a multiple, at most one, of `Recovery::softening`.
     /// The argument `work_on_missed` is the work of the pressures of contacts on b. It is a fifth of eta^2 with linear
-    /// elements under a contact of a few cells, and small with quadratic ones. Initial strains act in all cells, and their
-    /// work is added. Other loads act where b is small.
+    /// elements under a contact of a few cells, and small with quadratic ones. Initial strains act in all cells, and
+    /// their work is added. Other loads act where b is small.
     pub fn errors(&self, work_on_missed: f64) -> Errors {
         let (of_interpolant, mut load, work_of_heat) = self.interpolation_error();
         let mut cells = of_interpolant;

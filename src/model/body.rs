@@ -295,8 +295,8 @@ impl Body {
         self.matrix.iter_mut().for_each(SpringMatrix::begin_anew);
     }
 
-    /// Replace the loads f on all dofs that this rank knows, those of `initial` strains, and the values of the `prescribed`
-    /// (dof, value), which are the same dofs as before. What was made of K stays.
+    /// Replace the loads f on all dofs that this rank knows, those of `initial` strains, and the values of the
+    /// `prescribed` (dof, value), which are the same dofs as before. What was made of K stays.
     pub fn reload(&mut self, load: Vec<f64>, initial: &InitialLoad, prescribed: Vec<(usize, f64)>) -> Result<()> {
         let stiffness = std::mem::take(&mut self.elastic.stiffness);
         if let Some(interior) = &mut self.interior {

@@ -144,8 +144,8 @@ impl BodySpec {
         self.load(on, LoadKind::Pressure(pressure.into()))
     }
 
-    /// Set the thermal expansion a degree, the same in all directions, and the temperature above that of the stress-free
-    /// body, a number or a function of the coordinates.
+    /// Set the thermal expansion a degree, the same in all directions, and the temperature above that of the
+    /// stress-free body, a number or a function of the coordinates.
     #[track_caller]
     pub fn heated(self, expansion: impl Into<Field>, temperature: impl Into<Field>) -> Self {
         let expansion = Some(Located::new(OneOrVector::One(expansion.into()), Place::here("expansion")));
