@@ -123,7 +123,7 @@ impl ContactPair {
         let along = self.normal.iter().map(|n| tangents.at(std::array::from_fn(|c| n[c]))).collect::<Vec<[f64; D]>>();
         let means = [0, 1].map(|side| turns.means(side, self, a, common));
         self.turn_with(&along, [a.space, b.space], |side, q| &means[side][q]);
-        // what normals lack is told of the bond itself
+        // warnings about normals belong to the bond itself
         self.is_turned = false;
         self.spread.clear();
         self.tilt.fill(0.0);
