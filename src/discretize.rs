@@ -231,22 +231,22 @@ impl Discrete {
         self.sides(i).map(|side| self.model.pairs[i].surfaces[side].as_str())
     }
 
-    /// Send every rank what only the owner rank of a body has: its largest stiffness and the stiffness at its contact
-    /// rows. Collective, after all ranks have made their problem.
+    /// Send every rank what only the owner ranks of a body have: its largest stiffness, the energy of its initial
+    /// strains, and the stiffness at its contact rows. Collective, after all ranks have made their problem.
     pub fn share(&mut self) {
         let count = self.model.bodies.len();
-        let mut message = vec![0.0; count + 2 * self.model.points()];
+        let mut message = vec![0.0; 2 * count + 2 * self.model.points()];
         for (body, slot) in self.model.bodies.iter().enumerate() {
-            message[body] = slot.scale;
+            (message[body], message[count + body]) = (slot.scale, slot.heat);
             if slot.local.is_some() && !slot.is_rigid {
-                self.model.put(body, &slot.row_stiffness, &mut message[count..]);
+                self.model.put(body, &slot.row_stiffness, &mut message[2 * count..]);
             }
         }
         self.model.exchange.sum(&mut message);
         for body in 0..self.model.meshed() {
-            let rows = self.model.of_body(body, &message[count..]);
+            let rows = self.model.of_body(body, &message[2 * count..]);
             let slot = &mut self.model.bodies[body];
-            (slot.scale, slot.row_stiffness) = (message[body], rows);
+            (slot.scale, slot.heat, slot.row_stiffness) = (message[body], message[count + body], rows);
         }
     }
 }

@@ -71,7 +71,7 @@ fn pair_to_json(built: &Built, i: usize) -> Value {
     let [low, high] = range(pair.gap.iter().copied());
     json!({
         "surfaces": built.discrete.surfaces(i),
-        "contact": built.discrete.specs[i].table,
+        "contact": built.discrete.specs[i].in_file(),
         "carrier": pair.surfaces[0],
         "points": pair.len(),
         "length": pair.area.iter().sum::<f64>(),
@@ -158,12 +158,13 @@ fn each_pair(built: &Built) -> Vec<String> {
     for (i, pair) in built.discrete.model.pairs.iter().enumerate() {
         let [low, high] = range(pair.gap.iter().copied());
         let [a, b] = built.discrete.surfaces(i);
+        let shear = if built.discrete.specs[i].slip.is_some() { ", shear" } else { "" };
         let without = match pair.uncovered() {
             0 => String::new(),
             count => format!(", {count} of {} facets without a partner", pair.cover.len()),
         };
         lines.push(format!(
-            "  contact {a} - {b}: {} points on {}, {} {:.6}, gap {} to {}{without}",
+            "  contact {a} - {b}{shear}: {} points on {}, {} {:.6}, gap {} to {}{without}",
             pair.len(),
             pair.surfaces[0],
             pair.measure.name(),

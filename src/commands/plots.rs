@@ -170,12 +170,14 @@ fn pressure_plot(done: &Done, i: usize) -> Plot {
         _ => format!("{}: {}", scene.title, done.built.discrete.surfaces(i).join(" - ")),
     };
     let (unit, stress) = scene.units.as_ref().map(|units| (units.length.as_str(), units.stress.as_str())).unzip();
-    let reference = done.built.discrete.specs[i].reference.as_ref();
+    let spec = &done.built.discrete.specs[i];
+    let pressure = if spec.slip.is_some() { "traction" } else { "contact pressure" };
+    let reference = spec.reference.as_ref();
     let curve = |field: &Field| curve("reference", &pairs[i], Style::Dashed, |_, x| field.eval(x)).color(Color::Grey);
     Plot {
         title,
         x: PlotAxis::linear(label(["x", "y", "z"][main_axis(&pairs[i])], unit)),
-        y: PlotAxis::linear(label("contact pressure", stress)),
+        y: PlotAxis::linear(label(pressure, stress)),
         series: reference.map(curve).into_iter().collect(),
     }
 }

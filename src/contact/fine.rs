@@ -7,9 +7,10 @@ use super::basis::PressureBasis;
 use super::pair::ContactPair;
 use super::pieces::{Coverage, IntegrationPoint, Intersection};
 use super::review::{products, rises};
-use super::side::{FaceNode, Side};
+use super::side::Side;
+use super::slip::{Tangents, Turns};
 use crate::exchange::Plain;
-use crate::fem::{Facets, lagrange, length, minus, unit};
+use crate::fem::{Facets, lagrange, length, minus};
 use crate::linalg::{Csr, dot};
 use crate::problem::order::Order;
 use nalgebra::{DMatrix, DVector};
@@ -70,6 +71,8 @@ pub struct Fine<const D: usize> {
     pub sides: [FineSide<D>; 2],
     /// Location of the contact points on side b.
     pub near: Projections<D>,
+    /// The turns of the surfaces in the slip, for a pair that is the shear of a bond.
+    pub turns: Option<Turns>,
 }
 
 /// The location of the integration points on one surface.
@@ -113,8 +116,8 @@ impl<const D: usize> Fine<D> {
             if touching { 0.0 } else { rise(a, point.facet_a, &point.at_a) + rise(b, point.facet_b, &point.at_b) }
         };
         let at_rim = facets_at_rim(a, b, common, &pair.cover, jumps);
-        let normal_a = |point: &IntegrationPoint<D>| vector_at(a, point.facet_a, &point.at_a, |at| at.normal);
-        let direction = |point: &IntegrationPoint<D>| vector_at(a, point.facet_a, &point.at_a, |at| at.direction);
+        let normal_a = |point: &IntegrationPoint<D>| a.vector_at(point.facet_a, &point.at_a, |at| at.normal);
+        let direction = |point: &IntegrationPoint<D>| a.vector_at(point.facet_a, &point.at_a, |at| at.direction);
         let degree = |cover: &Coverage| {
             let shows_all = cover.basis.as_ref().is_some_and(PressureBasis::is_of_part) || D == 2 && cover.is_whole();
             if shows_all { a.facets.order.degree() } else { 1 }
@@ -142,8 +145,27 @@ impl<const D: usize> Fine<D> {
             points,
             normal: shared.iter().map(direction).collect(),
             near: Projections::new(a, b, common, pair, (!touching).then_some(gap)),
+            turns: None,
             sides: [side(a, |p| p.facet_a, |p| p.at_a), side(b, |p| p.facet_b, |p| p.at_b)],
         }
+    }
+}
+
+impl<const D: usize> Fine<D> {
+    /// Let slip along the surface take the place of the compression, as [`ContactPair::slide`] does.
+    #[must_use]
+    pub fn slide(mut self, tangents: Tangents, turns: Turns) -> Self {
+        self.turns = Some(turns);
+        self.normal.iter_mut().chain(&mut self.near.normal).for_each(|normal| *normal = tangents.at(*normal));
+        self
+    }
+
+    /// Add the turns of a side for displacements `u` of all nodes of its body to the values at the integration points.
+    pub fn add_turns(&self, side: usize, u: &[f64], values: &mut [f64]) {
+        let Some(Turns(rows)) = &self.turns else { return };
+        let mut turns = vec![0.0; values.len()];
+        rows[side].multiply(u, &mut turns);
+        crate::linalg::axpy(1.0, &turns, values);
     }
 }
 
@@ -259,16 +281,6 @@ fn kink(order: Order, function: &dyn Fn(f64) -> f64) -> Option<f64> {
 fn size_under<const D: usize>(a: &Side<D>, point: &IntegrationPoint<D>) -> f64 {
     let sides = (D - 1) as f64;
     (sides * length(a.area(point.facet_a))).powf(1.0 / sides)
-}
-
-/// Return a unit vector of the nodes of a side at barycentric coordinates `l` of a facet, interpolated between the
-/// vertices of the facet.
-fn vector_at<const D: usize>(side: &Side<D>, facet: usize, l: &[f64; D], of: fn(&FaceNode<D>) -> [f64; D]) -> [f64; D] {
-    let mut sum = [0.0; D];
-    for (at, l) in side.facet_nodes(facet).zip(l) {
-        (0..D).for_each(|c| sum[c] += l * of(at)[c]);
-    }
-    unit(sum)
 }
 
 /// The projections of the contact points of a pair to side b, one entry a point.

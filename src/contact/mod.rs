@@ -13,6 +13,7 @@ pub mod pieces;
 mod point;
 mod review;
 mod side;
+mod slip;
 
 pub use basis::PressureBasis;
 pub use fine::{Fine, FinePoint, FinePoints};
@@ -21,3 +22,4 @@ pub use pair::{ContactPair, Fault, Measure, add, assemble, moment_in_scene};
 pub use pieces::Coverage;
 pub use review::{Chords, ends};
 pub use side::Side;
+pub use slip::{Tangents, Turns};

@@ -216,7 +216,7 @@ pub fn assemble<const D: usize>(
     for (index, side) in [a, b].into_iter().enumerate() {
         for (q, point) in points.iter().enumerate() {
             let shares = point.shares(index);
-            push_rows(&mut pair, index, side.space, of_nodes(side, &shares), nodes[q].direction);
+            push_rows(&mut pair, index, side.space, directed(index, of_nodes(side, &shares), nodes[q].direction));
         }
         pair.hold(index, side.frame, side.prescribed);
     }
@@ -267,20 +267,23 @@ fn of_nodes<const D: usize>(side: &Side<D>, shares: &[(u32, f64)]) -> BTreeMap<u
     sums
 }
 
-/// Append the rows of the displacements of nodes of a contact point for one side of a pair. `index` is 0 for side a and
-/// 1 for side b, `shares` holds the shares of the side's nodes in the point, and `normal` points out of side a.
-fn push_rows<const D: usize>(
-    pair: &mut ContactPair,
+/// Return the entries of the displacements of nodes in the row of a contact point for one side of a pair. `index` is 0
+/// for side a and 1 for side b, `shares` holds the shares of the side's nodes in the point, and `normal` points out of
+/// side a.
+fn directed<const D: usize>(
     index: usize,
-    space: &Space<D>,
     shares: impl IntoIterator<Item = (u32, f64)>,
     normal: [f64; D],
-) {
+) -> BTreeMap<u32, [f64; D]> {
     let sign = [1.0, -1.0][index];
+    shares.into_iter().map(|(n, share)| (n, normal.map(|normal| sign * share * normal))).collect()
+}
+
+/// Append the row of a contact point for one side of a pair, from its entries at the nodes of the side.
+fn push_rows<const D: usize>(pair: &mut ContactPair, index: usize, space: &Space<D>, entries: BTreeMap<u32, [f64; D]>) {
     let mut nodal = Vec::new();
     let (mut resultant, mut moment) = ([0.0; 3], [0.0; 3]);
-    for (n, share) in shares {
-        let entry = normal.map(|normal| sign * share * normal);
+    for (n, entry) in entries {
         nodal.extend((0..D).map(|c| (D * n as usize + c, entry[c])));
         add(&mut resultant, space.net_force(entry));
         add(&mut moment, space.net_moment(n, entry));
@@ -406,12 +409,29 @@ impl ContactPair {
     /// Replace the unit normals at all points, and with them the rows of the displacements of nodes on both sides.
     /// [`ContactPair::hold`] then makes the rows of dofs.
     pub fn turn<const D: usize>(&mut self, normal: &[[f64; D]], spaces: [&Space<D>; 2]) {
+        self.turn_with(normal, spaces, |_, _| &[]);
+    }
+
+    /// Do the same with `more` entries at nodes in the row of each side and point.
+    pub(super) fn turn_with<'m, const D: usize>(
+        &mut self,
+        normal: &[[f64; D]],
+        spaces: [&Space<D>; 2],
+        more: impl Fn(usize, usize) -> &'m [(u32, [f64; D])],
+    ) {
         for (index, space) in spaces.into_iter().enumerate() {
-            let shares: Vec<Vec<(u32, f64)>> = (0..self.len()).map(|q| self.shares::<D>(index, q)).collect();
+            let of_point = |q: usize| directed(index, self.shares::<D>(index, q), normal[q]);
+            let rows: Vec<BTreeMap<u32, [f64; D]>> = (0..self.len()).map(of_point).collect();
             self.nodal[index] = Csr::new(space.dofs());
             self.resultant[index].clear();
             self.moment[index].clear();
-            shares.into_iter().zip(normal).for_each(|(shares, n)| push_rows(self, index, space, shares, *n));
+            for (q, mut entries) in rows.into_iter().enumerate() {
+                for (node, more) in more(index, q) {
+                    let entry = entries.entry(*node).or_insert([0.0; D]);
+                    (0..D).for_each(|c| entry[c] += more[c]);
+                }
+                push_rows(self, index, space, entries);
+            }
         }
         self.normal = normal.iter().map(|&n| pad(n)).collect();
         self.is_turned = true;

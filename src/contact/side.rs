@@ -183,6 +183,15 @@ impl<'a, const D: usize> Side<'a, D> {
         self.on_facet(i).iter().map(|&corner| &self.nodes[corner as usize])
     }
 
+    /// Return a unit vector of the nodes at barycentric coordinates `l` of a facet, interpolated between its vertices.
+    pub fn vector_at(&self, facet: usize, l: &[f64; D], of: fn(&FaceNode<D>) -> [f64; D]) -> [f64; D] {
+        let mut sum = [0.0; D];
+        for (at, l) in self.facet_nodes(facet).zip(l) {
+            (0..D).for_each(|c| sum[c] += l * of(at)[c]);
+        }
+        unit(sum)
+    }
+
     /// Return the surface of the facets that `keep` marks. Its nodes have the normals of the whole surface.
     pub fn only(&self, keep: &[bool]) -> Self {
         let kept = (0..keep.len()).filter(|&i| keep[i]).flat_map(|i| self.on_facet(i)).copied();

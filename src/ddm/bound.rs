@@ -145,14 +145,15 @@ impl Reached {
 /// reference. Its layers may answer an overlap with any pressure, so the surfaces deflect first ([`start::at`]). Under
 /// loads the start alone is the reference: an overlap says nothing of the pressures that carry them. A contact may also
 /// vanish while bodies carry other loads. Then the reference is the energy of their strains, as a pressure on all
-/// surfaces.
+/// surfaces. Bodies that expand have the energy of hindered expansion as a reference, too: free ones carry the rounding
+/// of it.
 ///
 /// A solution below [`PART`] of a reference is measured by that share of it. With a tolerance of 1e-8 this is 1e-14 of
 /// what the bodies carry, which is lost in the rounding of their forces. A start that the scene gives is no reference,
 /// because it may be any displacement.
 #[derive(Debug, Clone, Default)]
 pub struct Scale {
-    /// [`PART`] squared of the energy of a start, sum omega p c.
+    /// [`PART`] squared of the energy of a start, sum omega p c, or of hindered expansion.
     energy: f64,
     /// Energy of [`PART`] of the last displacements of the surfaces, as deflections.
     moved: f64,
@@ -166,8 +167,9 @@ impl Scale {
     /// Return the scales of a model, from traces (2n each) that a run may begin with.
     pub fn new(model: &Model, traces: &[&[f64]]) -> Self {
         let energy = |trace: &&[f64]| dot(&start::at(model, trace).force, &model.compression(trace));
+        let heat = model.bodies.iter().map(|slot| slot.heat).sum();
         Self {
-            energy: PART * PART * traces.iter().map(energy).fold(0.0, f64::max),
+            energy: PART * PART * traces.iter().map(energy).fold(heat, f64::max),
             moved: 0.0,
             area: model.area.iter().sum(),
             compliance: surface_slopes(model).iter().zip(&model.area).map(|(slope, area)| area / slope).sum(),

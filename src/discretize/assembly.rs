@@ -4,10 +4,11 @@ use super::body_mesh::BodyMesh;
 use super::facts::BodyInfo;
 use super::groups::point;
 use super::post::FemBody;
-use super::scene_body::{elasticity_of, refusal};
+use super::scene_body::{elasticity_of, refusal, too_large};
 use crate::error::{Error, Result};
 use crate::exchange::Plain;
-use crate::fem::{ElasticBody, Elasticity, NodeGraph, Prolongation, assemble, rigid, support};
+use crate::fem::assemble::{Defect, InitialLoad};
+use crate::fem::{ElasticBody, NodeGraph, Prolongation, assemble, rigid, support};
 use crate::linalg::{Csr, countable};
 use crate::mesh::Mesh;
 use crate::model::{Body, BodyCounts, BodyFacts, BodySlot, Distribution, InterfaceDofs};
@@ -66,7 +67,10 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
         let (name, exact, supports, own) = (info.name.clone(), spec.exact.clone(), spec.fix.len(), mesh.own_nodes());
         let mut body = FemBody { name, exact, supports, mesh, own, elasticity, split: OnceCell::new() };
         if body.mesh.is_owned {
-            self.give_solver(spec, &mut body, before, slot, info.rank)?;
+            let initial = initial_load(spec, &body, &self.mesh.path)?;
+            slot.heat = initial.energy;
+            let loads = BodyLoads { force: body.mesh.load_vector(), initial };
+            self.give_solver(spec, &mut body, loads, before, slot, info.rank)?;
         }
         let body = Rc::new(body);
         if body.mesh.is_owned {
@@ -84,19 +88,20 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
         &mut self,
         spec: &BodySpec,
         fem: &mut FemBody<D>,
+        loads: BodyLoads,
         before: EarlierBody,
         slot: &mut BodySlot,
         owner: usize,
     ) -> Result<()> {
-        let (load, is_owner) = (fem.mesh.load_vector(), owner == self.rank);
+        let is_owner = owner == self.rank;
         if let Some((mut body, BodySlot { scale, row_stiffness, .. })) = before.serving {
-            body.reload(load, fem.mesh.prescribed())?;
+            body.reload(loads.force, &loads.initial, fem.mesh.prescribed())?;
             (slot.local, slot.scale, slot.row_stiffness) = (Some(body), scale, row_stiffness);
             // the sums of all ranks are known
             slot.row_stiffness.iter_mut().filter(|_| !is_owner).for_each(|stiffness| *stiffness = 0.0);
         } else {
             self.assemblies += usize::from(is_owner);
-            self.assemble(spec, fem, load, slot)?;
+            self.assemble(spec, fem, loads, slot)?;
             slot.local.iter_mut().for_each(|body| body.count_on(before.counts));
         }
         slot.scale = if is_owner { slot.scale } else { 0.0 };
@@ -105,13 +110,8 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
 
     /// Assemble the matrix of a body, all of it or the rows of this rank, and make its solver, which takes the contact
     /// rows.
-    fn assemble(
-        &mut self,
-        spec: &BodySpec,
-        FemBody { elasticity, mesh, .. }: &mut FemBody<D>,
-        load: Vec<f64>,
-        slot: &mut BodySlot,
-    ) -> Result<()> {
+    fn assemble(&mut self, spec: &BodySpec, fem: &mut FemBody<D>, loads: BodyLoads, slot: &mut BodySlot) -> Result<()> {
+        let mesh = &mut fem.mesh;
         let prescribed = mesh.prescribed();
         let modes = mesh.free_motions().iter();
         let mut unconstrained_modes: Vec<Vec<f64>> = modes.map(|motion| mesh.dofs_of(motion)).collect();
@@ -122,14 +122,14 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
         if let Some(owned) = &owned {
             graph = graph.of(|node| owned.is_own::<D>(node));
         }
-        let mut body = elastic_body(spec, elasticity, mesh, &self.mesh.path, &graph, load, prescribed)?;
+        let mut body = elastic_body(spec, fem, &self.mesh.path, &graph, loads, prescribed)?;
         drop(graph);
         slot.scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
         slot.row_stiffness = rows.quadratic_diagonal(&body.stiffness);
         if let Some(owned) = &owned {
             body = owned.restrict::<D>(body);
         }
-        let mesh = &*mesh;
+        let mesh = &fem.mesh;
         let interpolation = self.factory.wants_interpolation(&slot.name).then(|| match &owned {
             Some(owned) => owned.interpolation::<D>(|coarse| mesh.interpolation(coarse)),
             None => mesh.interpolation(&mesh.coarse_nodes()),
@@ -152,37 +152,67 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
     }
 }
 
+/// The loads of a body at its dofs.
+struct BodyLoads {
+    /// f without initial strains.
+    force: Vec<f64>,
+    /// Those of its initial strains.
+    initial: InitialLoad,
+}
+
 /// Assemble K of a body on its graph, with f and the supports. If the graph has the rows of some nodes only, so have K
 /// and f. `path` is that of the mesh.
 fn elastic_body<const D: usize>(
     spec: &BodySpec,
-    elasticity: &Elasticity,
-    body: &BodyMesh<D>,
+    fem: &FemBody<D>,
     path: &Path,
     graph: &NodeGraph,
-    mut load: Vec<f64>,
+    loads: BodyLoads,
     prescribed: Vec<(usize, f64)>,
 ) -> Result<ElasticBody> {
-    let name = &spec.name;
+    let (name, BodyMesh { space, held, springs, .. }) = (&spec.name, &fem.mesh);
     countable(&format!("the stiffness matrix of body `{}`", name.value), graph.entries::<D>())?;
-    let mut stiffness =
-        assemble::stiffness(&body.space, graph, &body.held.frame, elasticity).map_err(|defect| match defect {
-            assemble::Defect::Inverted(cell) => {
-                let corner = body.space.in_scene(body.space.cell_nodes(cell)[0]);
-                let message = format!("body `{}`: the curved cell at {} is folded", name.value, point(corner));
-                Error::mesh(path, None, message).help("refine the mesh there, or use order = 1")
-            }
-            assemble::Defect::Elasticity(number, x, flaw) => refusal(spec, number, Some(x), &flaw),
-        })?;
+    let mut stiffness = assemble::stiffness(space, graph, &held.frame, &fem.elasticity)
+        .map_err(|defect| refused(spec, &fem.mesh, path, defect))?;
     if (0..stiffness.rows()).any(|row| stiffness.row(row).any(|(_, k)| !k.is_finite())) {
         let message = format!("body `{}`: its stiffness is beyond the range of numbers", name.value);
         return Err(Error::scene(&spec.elasticity().place, message).label("far too large"));
     }
-    let frame = &body.held.frame;
-    body.springs.iter().for_each(|springs| assemble::add_blocks(graph, frame, springs, &mut stiffness));
+    springs.iter().for_each(|springs| assemble::add_blocks(graph, &held.frame, springs, &mut stiffness));
+    let BodyLoads { mut force, initial } = loads;
     // These rows belong to other ranks.
-    (0..load.len()).filter(|&i| stiffness.range(i).is_empty()).for_each(|i| load[i] = 0.0);
-    Ok(support(stiffness, load, prescribed))
+    (0..force.len()).filter(|&i| stiffness.range(i).is_empty()).for_each(|i| force[i] = 0.0);
+    Ok(support(stiffness, force, &initial, prescribed))
+}
+
+/// Return the load of the initial strains of a body at all dofs. Rows of nodes that this rank does not own are not
+/// complete, and cells whose first node it does not own have no energy.
+///
+/// # Errors
+/// A temperature or an expansion is not finite somewhere.
+fn initial_load<const D: usize>(spec: &BodySpec, fem: &FemBody<D>, path: &Path) -> Result<InitialLoad> {
+    let counts = |cell: &[u32]| cell.iter().min().is_some_and(|&first| fem.own[first as usize]);
+    let mut load = assemble::initial_load(&fem.mesh.space, &fem.elasticity, counts)
+        .map_err(|defect| refused(spec, &fem.mesh, path, defect))?;
+    if !load.force.iter().all(|force| force.is_finite()) {
+        return Err(too_large(spec));
+    }
+    if !load.force.is_empty() {
+        fem.mesh.held.frame.forces(&mut load.force);
+    }
+    Ok(load)
+}
+
+/// Return the error of a body that cannot be assembled.
+fn refused<const D: usize>(spec: &BodySpec, body: &BodyMesh<D>, path: &Path, defect: Defect) -> Error {
+    match defect {
+        Defect::Inverted(cell) => {
+            let corner = body.space.in_scene(body.space.cell_nodes(cell)[0]);
+            let message = format!("body `{}`: the curved cell at {} is folded", spec.name.value, point(corner));
+            Error::mesh(path, None, message).help("refine the mesh there, or use order = 1")
+        }
+        Defect::Elasticity(number, x, flaw) => refusal(spec, number, Some(x), &flaw),
+    }
 }
 
 /// A maker of the inner solvers of bodies.

@@ -90,6 +90,7 @@ impl<const D: usize> SceneBody<'_, D> {
             modulus,
             depth,
             row_stiffness: Vec::new(),
+            heat: 0.0,
             imposed: self.trace(&self.mesh.imposed_motion()),
         };
         let info = BodyInfo {

@@ -113,7 +113,9 @@ impl<const D: usize> KeptMeshes<D> {
             let shapes = on.facets.facet(facet).iter().zip(element::values(on.facets.order, l));
             shapes.map(|(&node, phi)| sign * phi * dot(normal, &u[D * node as usize..][..D])).sum()
         };
-        on.facet.iter().zip(&on.at).zip(&fine.normal).map(at_point).collect()
+        let mut along: Vec<f64> = on.facet.iter().zip(&on.at).zip(&fine.normal).map(at_point).collect();
+        fine.add_turns(side, u, &mut along);
+        along
     }
 
     /// See [`Meshes::points`].
@@ -226,14 +228,18 @@ impl<const D: usize> RecoveredBody<'_, D> {
     pub fn recovered_displacement(&self, pair: usize, side: usize) -> Vec<f64> {
         let mut values = vec![0.0; self.kept.fine[pair].points.each.len()];
         self.visit(pair, side, |g, normal, at| values[g] = dot(&normal, &self.displacement(&at)));
+        self.kept.fine[pair].add_turns(side, self.u, &mut values);
         values
     }
 
     /// Return, at each contact point of a pair, how much the compression changes if the mean around the point is
     /// replaced by the value at the point itself. The body is side b of the pair, and `rows` are the rows B_b of its
-    /// nodal displacements.
+    /// nodal displacements. Turns of surfaces that are apart have means alone.
     pub fn beyond_means(&self, pair: usize, rows: &Csr) -> Vec<f64> {
-        let Fine { near, sides, .. } = &*self.kept.fine[pair];
+        let Fine { near, sides, turns, .. } = &*self.kept.fine[pair];
+        if turns.as_ref().is_some_and(|turns| turns.are_apart()) {
+            return vec![0.0; near.at.len()];
+        }
         let (mut mean, split) = (vec![0.0; near.at.len()], self.split.facets(&sides[1].facets));
         rows.multiply(self.u, &mut mean);
         let lacks = |(q, mean): (usize, f64)| {
@@ -252,5 +258,6 @@ impl<const D: usize> RecoveredBody<'_, D> {
                 (0..D).for_each(|c| r[D * node as usize + c] += force[g] * phi * normal[c]);
             }
         });
+        self.kept.fine[pair].turns.iter().for_each(|turns| turns.0[side].add_transpose(1.0, force, r));
     }
 }

@@ -8,7 +8,7 @@ use super::groups::{Owners, find_group, point};
 use super::scene_body::SceneBody;
 use crate::contact::law::{self, OwnLaws};
 use crate::contact::pieces::{Cut, Intersection, Reach};
-use crate::contact::{self, Chords, ContactPair, Fault, Fine, Mirrors, Side};
+use crate::contact::{self, Chords, ContactPair, Fault, Fine, Mirrors, Side, Tangents, Turns};
 use crate::error::{Error, Located, Result};
 use crate::fem::{Facets, jumping, minus, unit};
 use crate::linalg::{bounds, dot};
@@ -275,7 +275,7 @@ fn check(pair: &ContactPair, spec: &ContactSpec) -> Result<()> {
 /// Two of the contacts have a facet with the same partner.
 fn refuse_second_layers<const D: usize>(scene: &Scene, contacts: &[Contact<D>]) -> Result<()> {
     let mut first: HashMap<[[u32; 3]; 2], usize> = HashMap::new();
-    for (number, contact) in contacts.iter().enumerate() {
+    for (number, contact) in contacts.iter().enumerate().filter(|(_, contact)| contact.inputs.spec.slip.is_none()) {
         for facing in &contact.facts.facing {
             let mut facets = facing.facets;
             facets.sort_unstable();
@@ -316,7 +316,7 @@ fn named<'a, const D: usize>(
         return Ok(SurfacePair::new(spec, [first, parts.len()], [side, obstacle]));
     }
     let (second, on_second) = surface(1)?;
-    if first == second && spec.preload.is_none() {
+    if first == second && spec.preload.is_none() && spec.slip.is_none() {
         let message = format!("both surfaces belong to body `{}`", parts[first].spec.name.value);
         return Err(Error::scene(&spec.between[1].place, message)
             .help("contact of a body with itself is out of scope; make two bodies of it"));
@@ -344,8 +344,9 @@ impl<'a, const D: usize> SurfacePair<'a, D> {
         self
     }
 
-    /// Return what both surfaces have in common, and whether they look away from each other.
-    fn common(&mut self, cut: Cut<D>) -> (Intersection<D>, bool) {
+    /// Return what both surfaces have in common, the same with their distances if these do not count, and whether they
+    /// look away from each other.
+    fn common(&mut self, cut: Cut<D>) -> (Intersection<D>, Option<Intersection<D>>, bool) {
         let (spec, [a, b]) = (self.spec, &mut self.sides);
         let reach = Reach::between(a, b, spec.angle, spec.distance);
         let mut common = if spec.obstacle { Intersection::of_one(a) } else { cut(a, b, &reach) };
@@ -360,10 +361,11 @@ impl<'a, const D: usize> SurfacePair<'a, D> {
                 common = anywhere;
             }
         }
+        let apart = spec.slip.is_some().then(|| common.clone());
         if spec.is_touching() || is_through {
             common.close();
         }
-        (common, is_through)
+        (common, apart, is_through)
     }
 
     /// Assemble the pair, and its integration points if `fine` requests them. Return none if the surfaces of a pair
@@ -375,7 +377,7 @@ impl<'a, const D: usize> SurfacePair<'a, D> {
         cut: Cut<D>,
         fine: bool,
     ) -> Result<Option<Contact<D>>> {
-        let (common, is_through) = self.common(cut);
+        let (common, apart, is_through) = self.common(cut);
         let is_touching = self.spec.is_touching() || is_through;
         let Self { spec, bodies, sides: [a, b], far: [far, _], swapped } = self;
         let is_found = spec.is_rule();
@@ -398,13 +400,21 @@ impl<'a, const D: usize> SurfacePair<'a, D> {
             Some(part) => jumping(side.space, &part.elasticity, &side.facets.nodes),
             None => HashSet::new(),
         };
-        let fine = if fine {
+        let mut fine = if fine {
             let [mut at_a, at_b] = [jumps(0, &a), jumps(1, &b)];
             at_a.extend(a.layer_jumps(&law)?);
             Some(Fine::new(&a, &b, &common, &pair, &gap, is_touching, [&at_a, &at_b]))
         } else {
             None
         };
+        if let Some(slip) = spec.slip {
+            let tangents = Tangents::new(&pair.normal, slip.direction);
+            let apart = apart.as_ref().unwrap_or(&common);
+            let turns = Turns::new([&a, &b], apart, tangents);
+            pair.slide(tangents, &turns, [&a, &b], apart);
+            [&a, &b].into_iter().enumerate().for_each(|(k, side)| pair.hold(k, side.frame, side.prescribed));
+            fine = fine.map(|fine| fine.slide(tangents, turns));
+        }
         let chords = if is_touching { None } else { Chords::of(&a, &b, &common, &pair) };
         let ends = spec.distance.map_or(Vec::new(), |_| contact::ends(&a, &common, &pair, &far));
         let facing = Facing::all(parts, [&a, &b], &common, &pair);

@@ -178,6 +178,12 @@ impl<const D: usize> Post for FemBody<D> {
         all.push(self, &load);
         all.push(self, &contact);
         let mut known: Vec<f64> = load.iter().zip(&contact).map(|(load, contact)| load + contact).collect();
+        // forces of initial strains balance each other, and round as forces of their sizes
+        let initial = assemble::initial_load(space, &self.elasticity, |_| false).unwrap_or_default().force;
+        for (node, force) in initial.chunks_exact(D).enumerate().filter(|(node, _)| self.own[*node]) {
+            all.grow(space, node as u32, std::array::from_fn(|c| force[c]));
+        }
+        known.iter_mut().zip(&initial).for_each(|(known, force)| *known += force);
         for blocks in &self.mesh.springs {
             let mut pull = vec![0.0; u.len()];
             for NodalBlock { nodes: [a, b], block } in blocks {

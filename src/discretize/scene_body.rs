@@ -14,7 +14,7 @@ use crate::fem::{Elasticity, Facets, NodalForces, PointExtent, RigidMotion, Spac
 use crate::linalg::{Csr, PART, Total};
 use crate::mesh::{self, Group, Mesh};
 use crate::model::{Motion, Segment};
-use crate::problem::{BodySpec, Constants, ElasticitySpec, Order, Plane};
+use crate::problem::{BodySpec, Constants, ElasticitySpec, OneOrVector, Order, Plane};
 use crate::problem::{Load, LoadKind};
 use crate::scene::Scene;
 use std::cell::OnceCell;
@@ -278,7 +278,7 @@ fn body_force<const D: usize>(spec: &BodySpec, space: &Space<D>) -> Result<Nodal
 }
 
 /// Return the error of loads whose sum is beyond the range of numbers.
-fn too_large(spec: &BodySpec) -> Error {
+pub fn too_large(spec: &BodySpec) -> Error {
     Error::scene(&spec.name.place, format!("body `{}`: its loads together are too large", spec.name.value))
         .label("their forces are beyond the range of numbers")
 }
@@ -400,7 +400,12 @@ fn elasticity<const D: usize>(spec: &BodySpec, space: &Space<D>, mesh: &Mesh<D>,
 pub fn elasticity_of(spec: &BodySpec, of_cell: Vec<usize>, dimension: usize, plane: Plane) -> Result<Elasticity> {
     let constants: Vec<ElasticitySpec> = constants(spec).collect();
     let constants: Vec<&ElasticitySpec> = constants.iter().collect();
-    Elasticity::new(&constants, of_cell, dimension, plane).map_err(|(number, flaw)| refusal(spec, number, None, &flaw))
+    let elasticity = Elasticity::new(&constants, of_cell, dimension, plane)
+        .map_err(|(number, flaw)| refusal(spec, number, None, &flaw))?;
+    Ok(match &spec.temperature {
+        Some(temperature) => elasticity.heated(temperature.value.clone(), spec.heat_factor),
+        None => elasticity,
+    })
 }
 
 /// Return the constants of a body and of its regions.
@@ -413,7 +418,9 @@ fn constants(spec: &BodySpec) -> impl Iterator<Item = ElasticitySpec> {
 pub fn refusal(spec: &BodySpec, number: usize, x: Option<[f64; 3]>, flaw: &Flaw) -> Error {
     let elasticity = constants(spec).nth(number).unwrap_or_else(|| spec.elasticity());
     let place = &elasticity.place;
-    let fields = elasticity.fields();
+    let temperature = spec.temperature.iter().map(|temperature| ("temperature", &temperature.value));
+    let expansion = elasticity.expansion.iter().flat_map(OneOrVector::fields).map(|field| ("expansion", field));
+    let fields: Vec<_> = elasticity.fields().into_iter().chain(temperature).chain(expansion).collect();
     // A value that does not exist causes every other flaw, so it is reported first.
     if let Some(error) = x.and_then(|x| fields.iter().find_map(|(name, field)| field.eval_finite(name, x).err())) {
         return error.because(of_body(&spec.name.value));

@@ -10,7 +10,7 @@ use super::frame::{Frame, place};
 use super::space::{CellPoint, Space};
 use super::{lagrange, length, pad};
 use crate::exchange::Plain;
-use crate::linalg::{Csr, Total, dot};
+use crate::linalg::{Csr, Total, axpy, dot};
 use crate::problem::order::Order;
 use nalgebra::SMatrix;
 use serde::{Deserialize, Serialize};
@@ -485,6 +485,45 @@ pub fn body_force<const D: usize>(space: &Space<D>, density: &dyn Fn([f64; D]) -
     NodalForces::new(nodes.into_iter(), &load)
 }
 
+/// The load of initial strains eps0 = alpha T, which act like a stress C eps0 at every point.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct InitialLoad {
+    /// `int eps0 : C eps(v)` for every shape function v, one entry a dof; empty without initial strains.
+    pub force: Vec<f64>,
+    /// `int eps0 : C eps0`.
+    pub energy: f64,
+}
+
+/// Return the load of the initial strains at the nodes of a space. Its energy is that of the cells for which `counts`
+/// holds.
+///
+/// # Errors
+/// [`Defect`]: a cell whose map is not invertible at an integration point, or a point without elasticity or
+/// temperature.
+pub fn initial_load<const D: usize>(
+    space: &Space<D>,
+    elasticity: &Elasticity,
+    counts: impl Fn(&[u32]) -> bool,
+) -> Result<InitialLoad, Defect> {
+    if !elasticity.is_heated() {
+        return Ok(InitialLoad::default());
+    }
+    let rule = element::rule_of_products(D + 1, space.order).with_shapes(space.order);
+    let mut load = InitialLoad { force: vec![0.0; space.dofs()], energy: 0.0 };
+    for index in 0..space.cell_count() {
+        for point in space.points(index, &rule) {
+            let point = point.ok_or(Defect::Inverted(index))?;
+            let at = space.in_scene(point.at);
+            let flawed = |flaw| Defect::Elasticity(elasticity.region(index), at, flaw);
+            let strain = elasticity.initial_strain(index, at).map_err(flawed)?;
+            let stress = elasticity.at(index, at).map_err(flawed)?.stress(&strain);
+            point.add_stress(point.weight, &stress, &mut load.force);
+            load.energy += if counts(point.cell) { point.weight * dot(&stress, &strain) } else { 0.0 };
+        }
+    }
+    Ok(load)
+}
+
 /// A discretised elastic body: stiffness K, load f, and the terms that were eliminated with the prescribed dofs.
 ///
 /// A prescribed dof c with the value u_c stays as a row of K with one entry, `K[c][c]` = a typical diagonal, and `f[c]
@@ -497,11 +536,13 @@ pub struct ElasticBody {
     pub load: Vec<f64>,
     /// Prescribed (dof, value), sorted by dof.
     pub prescribed: Vec<(usize, f64)>,
-    /// K_fc u_c on the free dofs f if some prescribed value is not zero, else empty. The strain energy needs it.
+    /// K_fc u_c less the load of initial strains on the free dofs f, the part of -f that belongs to the strain energy;
+    /// empty if no prescribed value differs from zero and there are no initial strains.
     pub lifting: Vec<f64>,
     /// Constant to be added to u'Ku/2 - f'u to give the potential energy of the body.
     pub energy_constant: f64,
-    /// Correction of u'Ku: u_c'K_cc u_c with the original K_cc less the value with the scaled diagonal.
+    /// Constant to be added to u'Ku + 2 lifting'u to give twice the strain energy: u_c'K_cc u_c with the original K_cc
+    /// less the value with the scaled diagonal, and what initial strains add.
     pub strain_constant: f64,
     /// Entries of K that [`ElasticBody::reload`] needs; empty where it is not used.
     pub held: Couplings,
@@ -518,8 +559,9 @@ pub struct Couplings {
 }
 
 impl ElasticBody {
-    /// Replace the loads f, one entry a dof, and the values at the same prescribed dofs (dof, value).
-    pub fn reload(&mut self, load: Vec<f64>, mut prescribed: Vec<(usize, f64)>) {
+    /// Replace the loads f without those of initial strains, one entry a dof, the `initial` ones, and the values at the
+    /// same prescribed dofs (dof, value).
+    pub fn reload(&mut self, load: Vec<f64>, initial: &InitialLoad, mut prescribed: Vec<(usize, f64)>) {
         let n = load.len();
         let (mut value, mut has_row, scale) = (vec![None; n], vec![false; n], self.held.diagonal);
         prescribed.iter().for_each(|&(dof, u)| value[dof] = Some(u));
@@ -539,6 +581,7 @@ impl ElasticBody {
         prescribed.retain(|entry| has_row[entry.0]);
         self.load = load;
         self.load.iter_mut().zip(&self.lifting).for_each(|(load, lifting)| *load -= lifting);
+        self.add_initial(initial, &prescribed);
         self.energy_constant = 0.5 * self.strain_constant;
         for &(dof, u) in &prescribed {
             self.energy_constant += 0.5 * scale * u * u - self.load[dof] * u;
@@ -547,13 +590,33 @@ impl ElasticBody {
         }
         self.prescribed = prescribed;
     }
+
+    /// Add initial strains to the strain energy u'Ku, which becomes the integral of (eps - eps0) : C (eps - eps0), and
+    /// to the loads of free dofs.
+    fn add_initial(&mut self, initial: &InitialLoad, prescribed: &[(usize, f64)]) {
+        if initial.force.is_empty() {
+            return;
+        }
+        let mut free = initial.force.clone();
+        prescribed.iter().for_each(|entry| free[entry.0] = 0.0);
+        self.lifting.resize(free.len(), 0.0);
+        axpy(-1.0, &free, &mut self.lifting);
+        axpy(1.0, &free, &mut self.load);
+        let work: f64 = prescribed.iter().map(|&(dof, u)| initial.force[dof] * u).sum();
+        self.strain_constant += initial.energy - 2.0 * work;
+    }
 }
 
 /// Eliminate prescribed dofs from K and f, symmetrically, and keep the terms that energies need.
 ///
 /// `prescribed` holds (dof, value), sorted, without repetition. Empty rows of K belong to other ranks, which also
-/// account for their energies.
-pub fn support(mut stiffness: Csr, load: Vec<f64>, prescribed: Vec<(usize, f64)>) -> ElasticBody {
+/// account for their energies. `initial` is the load of initial strains, which f does not have.
+pub fn support(
+    mut stiffness: Csr,
+    load: Vec<f64>,
+    initial: &InitialLoad,
+    prescribed: Vec<(usize, f64)>,
+) -> ElasticBody {
     let n = load.len();
     let mut is_free = vec![true; n];
     prescribed.iter().for_each(|entry| is_free[entry.0] = false);
@@ -573,7 +636,7 @@ pub fn support(mut stiffness: Csr, load: Vec<f64>, prescribed: Vec<(usize, f64)>
         }
     }
     let mut body = ElasticBody { stiffness, held: Couplings { columns, diagonal }, ..ElasticBody::default() };
-    body.reload(load, prescribed);
+    body.reload(load, initial, prescribed);
     body
 }
 
@@ -589,30 +652,39 @@ mod tests {
         k
     }
 
+    /// Return loads of initial strains with this share.
+    fn initial(share: f64) -> InitialLoad {
+        InitialLoad { force: vec![0.3 * share, -0.2 * share], energy: 0.9 * share * share }
+    }
+
     #[test]
     fn a_prescribed_value_keeps_energies_and_equilibrium() {
-        let body = support(springs(), vec![5.0, 0.7], vec![(1, 0.4)]);
-        let u = [(5.0 + 0.4) / 3.0, 0.4];
-        let mut ku = [0.0; 2];
-        body.stiffness.multiply(&u, &mut ku);
-        let residual: f64 = (0..2).map(|i| (body.load[i] - ku[i]).abs()).sum();
-        assert!(residual < 1e-15, "{residual}");
-        let mut full = [0.0; 2];
-        springs().multiply(&u, &mut full);
-        let strain = dot(&u, &ku) + 2.0 * dot(&body.lifting, &u) + body.strain_constant;
-        assert!((strain - dot(&u, &full)).abs() < 1e-14);
-        let energy = 0.5 * dot(&u, &ku) - dot(&body.load, &u) + body.energy_constant;
-        let exact = 0.5 * dot(&u, &full) - 5.0 * u[0] - 0.7 * u[1];
-        assert!((energy - exact).abs() < 1e-14, "{energy} {exact}");
+        for heat in [InitialLoad::default(), initial(1.0), initial(-2.0)] {
+            let of_heat = |i: usize| heat.force.get(i).copied().unwrap_or(0.0);
+            let body = support(springs(), vec![5.0, 0.7], &heat, vec![(1, 0.4)]);
+            let u = [(5.0 + of_heat(0) + 0.4) / 3.0, 0.4];
+            let mut ku = [0.0; 2];
+            body.stiffness.multiply(&u, &mut ku);
+            let residual: f64 = (0..2).map(|i| (body.load[i] - ku[i]).abs()).sum();
+            assert!(residual < 1e-15, "{residual}");
+            let mut full = [0.0; 2];
+            springs().multiply(&u, &mut full);
+            let elastic = dot(&u, &full) - 2.0 * (of_heat(0) * u[0] + of_heat(1) * u[1]) + heat.energy;
+            let strain = dot(&u, &ku) + 2.0 * dot(&body.lifting, &u) + body.strain_constant;
+            assert!((strain - elastic).abs() < 1e-14);
+            let energy = 0.5 * dot(&u, &ku) - dot(&body.load, &u) + body.energy_constant;
+            let exact = 0.5 * elastic - 5.0 * u[0] - 0.7 * u[1];
+            assert!((energy - exact).abs() < 1e-14, "{energy} {exact}");
+        }
     }
 
     /// A reloaded body equals a body that is made with the other loads and prescribed values.
     #[test]
     fn a_body_takes_other_loads() {
-        for u in [0.4, 0.0] {
-            let mut body = support(springs(), vec![1.0, 2.0], vec![(1, -0.3)]);
-            body.reload(vec![5.0, 0.7], vec![(1, u)]);
-            let new = support(springs(), vec![5.0, 0.7], vec![(1, u)]);
+        for (u, heat) in [(0.4, InitialLoad::default()), (0.0, initial(1.0)), (0.4, initial(3.0))] {
+            let mut body = support(springs(), vec![1.0, 2.0], &initial(-1.0), vec![(1, -0.3)]);
+            body.reload(vec![5.0, 0.7], &heat, vec![(1, u)]);
+            let new = support(springs(), vec![5.0, 0.7], &heat, vec![(1, u)]);
             assert_eq!((&body.load, &body.prescribed, &body.lifting), (&new.load, &new.prescribed, &new.lifting));
             assert_eq!([body.energy_constant, body.strain_constant], [new.energy_constant, new.strain_constant]);
         }

@@ -58,10 +58,10 @@ fn stress_at<const D: usize>(
         let rule = element::rule(D + 1, if space.order == Order::P1 { 2 } else { 5 });
         element::interpolate(&space.cell_nodes(index), &element::values(space.order, &rule.points[0]))
     };
-    let material =
-        elasticity.at(index, space.in_scene(point.at)).or_else(|_| elasticity.at(index, space.in_scene(inside())));
+    let strain = point.slope(u).strain();
+    let stress = |at: [f64; D]| elasticity.stress(index, space.in_scene(at), &strain);
     // Assembly has evaluated the integration point, so it has a value.
-    Some((point.measure, material.ok()?.stress(&point.slope(u).strain())))
+    Some((point.measure, stress(point.at).or_else(|_| stress(inside())).ok()?))
 }
 
 /// Return by how much the stress changes from a node, where it is `stress`, to the middles of the cells around the
@@ -188,7 +188,8 @@ pub struct Norms {
     pub l2: f64,
     /// H1 seminorm: root of the integral of grad u : grad u, plus (u_r/r)^2 in bodies of revolution.
     pub h1: f64,
-    /// Energy norm: root of the integral of eps(u) : C eps(u), which is twice the strain energy.
+    /// Energy norm: root of twice the strain energy, the integral of eps : C eps with the strain eps of u, without the
+    /// initial strain.
     pub energy: f64,
 }
 
@@ -225,8 +226,11 @@ pub fn norms_of_error<const D: usize>(
             difference.add(-1.0, &exact_slope);
             let error = std::array::from_fn(|i| value[i] - known.value[i]);
             let material = elasticity.at(index, space.in_scene(point.at)).ok();
-            for (sum, (value, slope)) in squares.iter_mut().zip([(error, difference), (known.value, exact_slope)]) {
+            let initial = elasticity.initial_strain(index, space.in_scene(point.at)).unwrap_or_default();
+            let of_both = [(error, difference, [0.0; 6]), (known.value, exact_slope, initial)];
+            for (sum, (value, slope, initial)) in squares.iter_mut().zip(of_both) {
                 let strain = slope.strain();
+                let strain = std::array::from_fn(|i| strain[i] - initial[i]);
                 let stress = material.map_or([0.0; 6], |material| material.stress(&strain));
                 sum.l2 += point.weight * value.iter().map(|v| v * v).sum::<f64>();
                 sum.h1 += point.weight * slope.square();

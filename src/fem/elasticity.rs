@@ -4,10 +4,11 @@
 use super::space::{PAIRS, Slope, component};
 use super::{cross, length};
 use crate::error::Located;
+use crate::expression::Field;
 use crate::linalg::dot;
 use crate::problem::Plane;
-use crate::problem::Vector;
 use crate::problem::elasticity::{AxesSpec, Constants, ElasticitySpec};
+use crate::problem::{OneOrVector, Vector};
 use nalgebra::{Matrix3, Matrix6, Rotation3, Unit, Vector3};
 
 /// The elasticity of a body, cell by cell.
@@ -18,6 +19,15 @@ pub struct Elasticity {
     regions: Vec<MaterialRegion>,
     /// Region of each cell; empty if all cells have the first one.
     of_cell: Vec<usize>,
+    /// Temperature above that of the stress-free body, if there is one.
+    temperature: Option<Temperature>,
+}
+
+/// The temperature of a body in a load step.
+#[derive(Debug, Clone)]
+struct Temperature {
+    field: Field,
+    factor: f64,
 }
 
 /// The elastic constants of one region of a body.
@@ -28,7 +38,7 @@ struct MaterialRegion {
     constant: Option<(Material, [f64; 3])>,
 }
 
-/// Elasticities are equal if the constants of all cells are.
+/// Elasticities are equal if the constants of all cells are. Expansion and temperature are loads.
 impl PartialEq for Elasticity {
     fn eq(&self, other: &Self) -> bool {
         let both = self.regions.iter().map(|region| &region.spec).eq(other.regions.iter().map(|region| &region.spec));
@@ -76,7 +86,69 @@ impl Elasticity {
         let region = |(index, spec): (usize, &&ElasticitySpec)| {
             MaterialRegion::new(spec, dimension, plane).map_err(|flaw| (index, flaw))
         };
-        Ok(Self { regions: specs.iter().enumerate().map(region).collect::<Result<_, _>>()?, of_cell, dimension, plane })
+        let regions = specs.iter().enumerate().map(region).collect::<Result<_, _>>()?;
+        Ok(Self { regions, of_cell, dimension, plane, temperature: None })
+    }
+
+    /// Return the elasticity at `factor` times this temperature above that of the stress-free body.
+    #[must_use]
+    pub fn heated(self, field: Field, factor: f64) -> Self {
+        Self { temperature: Some(Temperature { field, factor }), ..self }
+    }
+
+    /// Return whether the body has a temperature.
+    pub fn is_heated(&self) -> bool {
+        self.temperature.is_some()
+    }
+
+    /// Return the initial strain alpha T (xx yy zz, and 2 eps of xy yz xz) in a cell at a point; zero without heat.
+    ///
+    /// # Errors
+    /// A temperature or an expansion that is not finite there.
+    pub fn initial_strain(&self, cell: usize, x: [f64; 3]) -> Result<[f64; 6], Flaw> {
+        let Some(Temperature { field, factor }) = &self.temperature else { return Ok([0.0; 6]) };
+        let temperature = factor * field.eval(x);
+        if !temperature.is_finite() {
+            return Err(Flaw::Constant("temperature", temperature, FINITE));
+        }
+        Ok(self.expansion(cell, x)?.map(|alpha| alpha * temperature))
+    }
+
+    /// Return the strain a degree (xx yy zz, and 2 eps of xy yz xz) in a cell at a point; zero without heat.
+    ///
+    /// # Errors
+    /// As [`Elasticity::initial_strain`].
+    pub fn expansion(&self, cell: usize, x: [f64; 3]) -> Result<[f64; 6], Flaw> {
+        let spec = &self.regions[self.region(cell)].spec;
+        let Some(given) = spec.expansion.as_ref().filter(|_| self.is_heated()) else { return Ok([0.0; 6]) };
+        let alpha: [f64; 3] = std::array::from_fn(|axis| given[axis].eval(x));
+        if let Some(value) = alpha.into_iter().find(|value| !value.is_finite()) {
+            return Err(Flaw::Constant("expansion", value, FINITE));
+        }
+        let axes = match (given, &spec.axes) {
+            (OneOrVector::Vector(_), Some(axes)) => directions(axes, x)?,
+            _ => [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+        };
+        let strain = std::array::from_fn(|component| {
+            let (i, j) = PAIRS[component];
+            let once: f64 = (0..3).map(|axis| alpha[axis] * axes[axis][i] * axes[axis][j]).sum();
+            if i == j { once } else { 2.0 * once }
+        });
+        let largest = alpha.iter().fold(0.0, |most: f64, alpha| most.max(alpha.abs()));
+        if self.plane == Plane::Axisymmetric && strain[4..].iter().any(|s: &f64| s.abs() > TWISTLESS * largest) {
+            return Err(Flaw::Twists);
+        }
+        Ok(strain)
+    }
+
+    /// Return the stress (xx yy zz xy yz xz) of a strain (xx yy zz, and 2 eps of xy yz xz) in a cell at a point: C (eps
+    /// - alpha T).
+    ///
+    /// # Errors
+    /// As [`Elasticity::at`] and [`Elasticity::initial_strain`].
+    pub fn stress(&self, cell: usize, x: [f64; 3], strain: &[f64; 6]) -> Result<[f64; 6], Flaw> {
+        let initial = self.initial_strain(cell, x)?;
+        Ok(self.at(cell, x)?.stress(&std::array::from_fn(|i| strain[i] - initial[i])))
     }
 
     /// Return whether the elasticity is the same in the whole body.
@@ -156,6 +228,9 @@ fn material(spec: &ElasticitySpec, tensor: Tensor, x: [f64; 3], dimension: usize
 /// Energies are products of at most a modulus, two displacements and lengths of [1e-40, 1e40](crate::mesh::LENGTHS).
 /// Rounding takes a share of 1e-32 of them, and forces are squared.
 const MODULI: [f64; 2] = [1e-50, 1e50];
+
+/// Requirement on temperatures and expansions.
+const FINITE: &str = "must be finite";
 
 /// Return whether a modulus is in this range.
 fn is_modulus(value: f64) -> bool {

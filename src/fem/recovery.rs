@@ -135,11 +135,17 @@ impl<'a, const D: usize> Recovery<'a, D> {
         }
     }
 
-    /// Return the stress (xx yy zz xy yz xz) of a strain in a cell at a point. Assembly evaluated the law there, so it
-    /// has a value.
+    /// Return the stress (xx yy zz xy yz xz) of a difference of strains in a cell at a point. Assembly evaluated the
+    /// law there, so it has a value.
     fn stress(&self, cell: usize, at: [f64; D], strain: &[f64; 6]) -> [f64; 6] {
         let material = self.elasticity.at(cell, self.space.in_scene(at));
         material.map_or([0.0; 6], |material| material.stress(strain))
+    }
+
+    /// Return the strain of a displacement in a cell at a point without the initial strain there.
+    fn elastic(&self, cell: usize, at: [f64; D], strain: &[f64; 6]) -> [f64; 6] {
+        let initial = self.elasticity.initial_strain(cell, self.space.in_scene(at)).unwrap_or_default();
+        std::array::from_fn(|i| strain[i] - initial[i])
     }
 
     /// Return the errors of the displacement.
@@ -155,10 +161,11 @@ impl<'a, const D: usize> Recovery<'a, D> {
     ///
     /// The load L of the interpolation error b does the work L(u_h) = eta^2 - f'b on the discrete displacement, except
     /// where the solution is singular. The missing work is done by a multiple, at most one, of `Recovery::softening`.
-    /// The argument `work_on_missed` is f'b, the work of the pressures of contacts on b. It is a fifth of eta^2 with
-    /// linear elements under a contact of a few cells, and small with quadratic ones. Other loads act where b is small.
+    /// The argument `work_on_missed` is the work of the pressures of contacts on b. It is a fifth of eta^2 with linear
+    /// elements under a contact of a few cells, and small with quadratic ones. Initial strains act in all cells, and
+    /// their work is added. Other loads act where b is small.
     pub fn errors(&self, work_on_missed: f64) -> Errors {
-        let (of_interpolant, mut load) = self.interpolation_error();
+        let (of_interpolant, mut load, work_of_heat) = self.interpolation_error();
         let mut cells = of_interpolant;
         match self.space.order {
             Order::P1 => cells = self.energy_errors(),
@@ -170,7 +177,8 @@ impl<'a, const D: usize> Recovery<'a, D> {
         let softening = self.softening(&cells);
         let work = dot(&softening, &self.displacement);
         if work > 0.0 {
-            let lacking = (cells.iter().sum::<f64>() - work_on_missed - dot(&load, &self.displacement)) / work;
+            let lacking =
+                (cells.iter().sum::<f64>() - work_on_missed - work_of_heat - dot(&load, &self.displacement)) / work;
             axpy(lacking.clamp(0.0, 1.0), &softening, &mut load);
         }
         let strips = self.add_strip(&mut load);
@@ -280,23 +288,25 @@ impl<'a, const D: usize> Recovery<'a, D> {
 
     /// Return the squared energy norm of the interpolation error b on each cell, and the residual `-int sigma(b) : grad
     /// v` for every shape function v, one entry per dof. A displacement with this residual is the error of the nodal
-    /// values.
-    fn interpolation_error(&self) -> (Vec<f64>, Vec<f64>) {
+    /// values. The last number is the work of initial strains on b.
+    fn interpolation_error(&self) -> (Vec<f64>, Vec<f64>, f64) {
         let space = self.space;
         // The gradient of b has one degree more than the elements, and that of v has one less.
         let rule = element::rule_of_products(D + 1, space.order).with_shapes(space.order);
-        let mut residual = vec![0.0; space.dofs()];
+        let (mut residual, mut work) = (vec![0.0; space.dofs()], 0.0);
         let of_cell = |index: usize| {
             let mut energy = 0.0;
             for point in space.points(index, &rule).flatten() {
                 let strain = self.missed_slope(&point).strain();
                 let stress = self.stress(index, point.at, &strain);
                 energy += point.weight * dot(&stress, &strain);
-                add_stress(&point, -point.weight, &stress, &mut residual);
+                work -= point.weight * dot(&stress, &self.elastic(index, point.at, &[0.0; 6]));
+                point.add_stress(-point.weight, &stress, &mut residual);
             }
             energy
         };
-        ((0..space.cell_count()).map(of_cell).collect(), residual)
+        let energies = (0..space.cell_count()).map(of_cell).collect();
+        (energies, residual, work)
     }
 
     /// Return the gradient of b at a point of a cell.
@@ -334,13 +344,13 @@ impl<'a, const D: usize> Recovery<'a, D> {
         for (index, error) in errors.iter().enumerate() {
             let (mut energy, mut stresses) = (0.0, Vec::with_capacity(rule.points.len()));
             for point in self.space.points(index, &rule).flatten() {
-                let strain = point.slope(&self.displacement).strain();
+                let strain = self.elastic(index, point.at, &point.slope(&self.displacement).strain());
                 let stress = self.stress(index, point.at, &strain);
                 energy += point.weight * dot(&stress, &strain);
                 stresses.push((point, stress));
             }
             let theta = error / (error + energy).max(f64::MIN_POSITIVE);
-            stresses.iter().for_each(|(point, stress)| add_stress(point, theta * point.weight, stress, &mut load));
+            stresses.iter().for_each(|(point, stress)| point.add_stress(theta * point.weight, stress, &mut load));
         }
         load
     }
@@ -349,14 +359,6 @@ impl<'a, const D: usize> Recovery<'a, D> {
 /// Return the relative change of volume of a strain (xx yy zz, and 2 eps of xy yz xz).
 fn dilatation(strain: &[f64; 6]) -> f64 {
     strain[..3].iter().sum()
-}
-
-/// Add `weight sigma : grad v` at a point for the shape functions v of its cell to `sum`, one entry per dof.
-fn add_stress<const D: usize>(point: &CellPoint<D>, weight: f64, stress: &[f64; 6], sum: &mut [f64]) {
-    for (a, &node) in point.cell.iter().enumerate() {
-        let force = point.force(stress, a);
-        (0..D).for_each(|c| sum[D * node as usize + c] += weight * force[c]);
-    }
 }
 
 /// Return the gradients of the barycentric coordinates at a point, also in curved cells, from the values of the

@@ -395,6 +395,14 @@ impl<const D: usize> CellPoint<'_, D> {
         force[0] += stress[2] * self.space.hoop(&self.at, self.phi[a]);
         force
     }
+
+    /// Add `weight sigma : grad v` for the shape functions v of the cell to `sum`, one entry per dof.
+    pub fn add_stress(&self, weight: f64, stress: &[f64; 6], sum: &mut [f64]) {
+        for (a, &node) in self.cell.iter().enumerate() {
+            let force = self.force(stress, a);
+            (0..D).for_each(|c| sum[D * node as usize + c] += weight * force[c]);
+        }
+    }
 }
 
 /// Index pairs of the components xx yy zz xy yz xz of stress and strain, in the order of VTK.

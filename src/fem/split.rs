@@ -127,7 +127,8 @@ pub fn jumping<const D: usize>(space: &Space<D>, elasticity: &Elasticity, nodes:
     found
 }
 
-/// Return whether the material of one cell at a node differs from that of another cell there.
+/// Return whether the material of one cell at a node differs from that of another cell there, in stiffness or in
+/// expansion.
 fn jumps<const D: usize>(space: &Space<D>, elasticity: &Elasticity, node: u32, cells: [usize; 2]) -> bool {
     if elasticity.region(cells[0]) == elasticity.region(cells[1]) && elasticity.is_constant_in(cells[0]) {
         return false;
@@ -137,9 +138,12 @@ fn jumps<const D: usize>(space: &Space<D>, elasticity: &Elasticity, node: u32, c
         let corners = || space.cell(cell)[..=D].iter().map(|&corner| space.nodes[corner as usize]);
         let middle = |c: usize| corners().map(|x| x[c]).sum::<f64>() / (D + 1) as f64;
         let near = std::array::from_fn(|c| at[c] + BESIDE * (middle(c) - at[c]));
-        elasticity.at(cell, space.in_scene(near)).ok()
+        let near = space.in_scene(near);
+        elasticity.at(cell, near).ok().zip(elasticity.expansion(cell, near).ok())
     };
-    beside(cells[0]).zip(beside(cells[1])).is_some_and(|(one, other)| differ(&one, &other))
+    let [one, other] = [beside(cells[0]), beside(cells[1])];
+    one.zip(other)
+        .is_some_and(|((one, expansion), (other, of_other))| differ(&one, &other) || is_jump(&[expansion, of_other]))
 }
 
 /// Return whether two laws give stresses that differ by more than a share of [`JUMP`] for some strain of one component.
@@ -148,11 +152,14 @@ fn differ(one: &Material, other: &Material) -> bool {
         let strain = std::array::from_fn(|i| f64::from(i == component));
         [one.stress(&strain), other.stress(&strain)]
     };
-    let norm = |stress: &[f64; 6]| stress.iter().map(|s| s * s).sum::<f64>().sqrt();
-    (0..6).map(stresses).any(|[p, q]| {
-        let difference = std::array::from_fn(|i| p[i] - q[i]);
-        norm(&difference) > JUMP * norm(&p).max(norm(&q))
-    })
+    (0..6).any(|component| is_jump(&stresses(component)))
+}
+
+/// Return whether two vectors differ by more than a share of [`JUMP`].
+fn is_jump([p, q]: &[[f64; 6]; 2]) -> bool {
+    let norm = |vector: &[f64; 6]| vector.iter().map(|v| v * v).sum::<f64>().sqrt();
+    let difference = std::array::from_fn(|i| p[i] - q[i]);
+    norm(&difference) > JUMP * norm(p).max(norm(q))
 }
 
 #[cfg(test)]

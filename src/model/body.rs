@@ -4,6 +4,7 @@ use super::Motion;
 use super::dofs::{Distribution, Dofs};
 use crate::error::{Error, Kind, Result};
 use crate::fem::ElasticBody;
+use crate::fem::assemble::InitialLoad;
 use crate::file::available_memory;
 use crate::linalg::{Csr, dot};
 use crate::petsc::{Rows, Schur, Session};
@@ -294,19 +295,19 @@ impl Body {
         self.matrix.iter_mut().for_each(SpringMatrix::begin_anew);
     }
 
-    /// Replace the loads f on all dofs that this rank knows, and the values of the `prescribed` (dof, value), which are
-    /// the same dofs as before. What was made of K stays.
-    pub fn reload(&mut self, load: Vec<f64>, prescribed: Vec<(usize, f64)>) -> Result<()> {
+    /// Replace the loads f on all dofs that this rank knows, those of `initial` strains, and the values of the
+    /// `prescribed` (dof, value), which are the same dofs as before. What was made of K stays.
+    pub fn reload(&mut self, load: Vec<f64>, initial: &InitialLoad, prescribed: Vec<(usize, f64)>) -> Result<()> {
         let stiffness = std::mem::take(&mut self.elastic.stiffness);
         if let Some(interior) = &mut self.interior {
-            let is_same = interior.reload(load, prescribed);
+            let is_same = interior.reload(load, initial, prescribed);
             if !is_same && interior.schur.is_some() {
                 self.elastic = interior.loads()?;
             }
         } else {
             let held = std::mem::take(&mut self.elastic.held);
             let mut whole = ElasticBody { held, ..ElasticBody::default() };
-            whole.reload(load, prescribed);
+            whole.reload(load, initial, prescribed);
             let own = self.dofs.distribution.as_ref().map(|distribution| distribution.restrict(&whole));
             self.elastic = ElasticBody { held: std::mem::take(&mut whole.held), ..own.unwrap_or(whole) };
             self.dofs.prescribed = std::mem::take(&mut self.elastic.prescribed);
@@ -349,10 +350,10 @@ impl Interior {
     }
 
     /// Replace the loads and prescribed values of the whole body. Return whether these are the same as before.
-    fn reload(&mut self, load: Vec<f64>, prescribed: Vec<(usize, f64)>) -> bool {
+    fn reload(&mut self, load: Vec<f64>, initial: &InitialLoad, prescribed: Vec<(usize, f64)>) -> bool {
         let of = |whole: &ElasticBody| [whole.load.clone(), whole.lifting.clone()];
         let (before, whole) = (of(&self.whole), &mut self.whole);
-        whole.reload(load, prescribed);
+        whole.reload(load, initial, prescribed);
         self.load = self.interface.turn(&whole.load);
         before == of(whole)
     }

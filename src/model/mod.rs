@@ -108,6 +108,8 @@ pub struct BodySlot {
     pub depth: f64,
     /// b diag(K) b' of each contact row b: the stiffness of the nodes under a point.
     pub row_stiffness: Vec<f64>,
+    /// Energy of the initial strains where the body cannot expand, int eps0 : C eps0.
+    pub heat: f64,
     /// B m on the contact rows, for the rigid motion m that comes nearest to the prescribed displacements.
     pub imposed: Vec<f64>,
 }
@@ -128,6 +130,7 @@ impl BodySlot {
             depth: 1.0,
             imposed: vec![0.0; points],
             row_stiffness: vec![0.0; points],
+            heat: 0.0,
         }
     }
 
@@ -456,6 +459,7 @@ pub(crate) mod sample {
             modulus: 3.0,
             depth: 1.0,
             row_stiffness: row_stiffness.to_vec(),
+            heat: 0.0,
             imposed: vec![0.0; row_stiffness.len()],
         };
         let bodies = vec![body(0, [8.0, 12.0, 0.0, 6.0]), body(1, [4.0, 20.0, 5.0, 7.0])];

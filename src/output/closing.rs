@@ -234,6 +234,16 @@ fn largest(displacement: Option<f64>, von_mises: Option<f64>, place: &str, units
 /// Return the line of a pair, which its surfaces name in the order of the scene.
 fn pair_line(pair: &PairReport, is_bonded: bool, units: &UnitWords) -> String {
     let (PairReport { surfaces: [a, b], bodies: [on, _], result, estimate, .. }, extent) = (pair, pair.result.extent);
+    if result.shear {
+        let TensionReport { peak_tension, peak_stretch, .. } = result.tension.unwrap_or_default();
+        let (traction, slip) = (result.peak_pressure.max(peak_tension), result.peak_compression.max(peak_stretch));
+        let sum = units.vector(result.force[0], traction * extent.contact());
+        let (traction, slip) = (readable(traction, 6), sci(slip, 3));
+        let UnitWords { stress, force, length, .. } = units;
+        return format!(
+            "  {a} - {b}: shear force on `{on}` {sum}{force}, traction up to {traction}{stress}, slip up to {slip}{length}"
+        );
+    }
     let is_pulled = result.tension.is_some_and(|tension| tension.peak_tension > 0.0);
     if result.peak_pressure <= 0.0 && !is_pulled || result.peak_pressure.is_nan() {
         return format!("  {a} - {b}: no contact");

@@ -33,13 +33,14 @@ pub const MARK: &str = "made by winkler";
 pub const MARK_OF_MESH: &str = "$Comments\nmade by winkler\n$EndComments\n";
 
 /// What stands at the beginning of the others: a checkpoint, a report, and columns of each kind of table.
-const BEGINNINGS: [&str; 7] = [
+const BEGINNINGS: [&str; 8] = [
     "winkler checkpoint ",
     "{\n  \"winkler\": \"",
     "iteration,residual,error,increment",
     ",status,iterations,residual",
     "surface_a,surface_b,points,closed",
     ",weight,gap,compression,pressure",
+    ",weight,gap,slip,traction",
     ",status,message,method,dofs,points",
 ];
 

@@ -373,6 +373,9 @@ pub struct PairResult {
     /// Closing of the gap (a length) that was found for the force or preload of the pair, or that a step keeps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub offset: Option<f64>,
+    /// True for the shear of a bond: pressures are tractions along the surface, and compressions slips.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub shear: bool,
 }
 
 /// Estimated relative errors of a pair: of its pressures, and of the sum of the pressures times their areas.

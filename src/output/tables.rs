@@ -303,17 +303,23 @@ pub struct ContactTable {
     pub pressure_error: Vec<f64>,
     /// Number of the smooth face of the surface with the points; empty if all points are on one.
     pub face: Vec<f64>,
+    /// Whether the pair is the shear of a bond: its compression is a slip, its pressure a traction along the surface.
+    pub is_slip: bool,
 }
+
+/// The columns of the compression and the pressure.
+const QUANTITIES: [&str; 2] = ["compression", "pressure"];
 
 impl ContactTable {
     /// Write the table as CSV, one row per contact point, with numbers to full precision.
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
-        let [name_a, name_b] = self.side_names.each_ref().map(|side| format!("u_n_{side}"));
+        let (along, [closing, force]) = if self.is_slip { ("u_t", ["slip", "traction"]) } else { ("u_n", QUANTITIES) };
+        let [name_a, name_b] = self.side_names.each_ref().map(|side| format!("{along}_{side}"));
         let mut columns: Vec<(&str, &[f64])> = vec![
             ("weight", &self.weight),
             ("gap", &self.gap),
-            ("compression", &self.compression),
-            ("pressure", &self.pressure),
+            (closing, &self.compression),
+            (force, &self.pressure),
             (&name_a, &self.displacement[0]),
             (&name_b, &self.displacement[1]),
         ];

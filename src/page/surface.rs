@@ -65,14 +65,17 @@ impl Surface {
 
     /// Return the surface of a pair with its pressures.
     pub fn of_contact(grid: UnstructuredGrid, body: usize) -> Self {
-        let values = |name: &str| {
-            let array = grid.at_points.iter().find(|array| array.name == name);
+        let values = |names: &[&str]| {
+            let array = grid.at_points.iter().find(|array| names.contains(&&*array.name));
             array.map_or(Vec::new(), |array| array.values.clone())
         };
+        // a slip opens nothing
+        let least = |c: f64| (-c).max(0.0);
+        let opening: Vec<f64> = values(&["compression", "area", "length"]).into_iter().map(least).collect();
         Self {
-            displacement: values("displacement").as_chunks().0.to_vec(),
-            value: values("pressure"),
-            opening: values("compression").into_iter().map(|c| (-c).max(0.0)).collect(),
+            displacement: values(&["displacement"]).as_chunks().0.to_vec(),
+            value: values(&["pressure", "traction"]),
+            opening,
             name: grid.title,
             body,
             points: grid.points,

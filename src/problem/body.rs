@@ -1,13 +1,13 @@
 //! Bodies: their names, elements, and what acts on them.
 
 use super::check::{Check, Fault};
-use super::compile::compile;
+use super::compile::{Compile, Names, compile};
 use super::elasticity::{AxesSpec, ElasticitySpec, Material, Orthotropic, RegionSpec};
 use super::geometry::Geometry;
 use super::load::{Load, LoadKind, SpringSpec, Support, one};
 use super::order::Order;
 use super::pattern::{self, is_pattern};
-use super::read::{Vector, located, refused, tables};
+use super::read::{OneOrVector, Vector, located, refused, tables};
 use crate::error::{Error, Located, Place, Result as Checked};
 use crate::expression::{Expression, Field};
 use crate::petsc::{begins_options, is_family};
@@ -54,6 +54,12 @@ pub struct BodySpec {
     pub spring: Vec<SpringSpec>,
     /// force density, one number or expression for each component
     pub force: Option<Vector>,
+    /// thermal expansion a degree, one value or one along each axis
+    pub expansion: Option<Located<OneOrVector>>,
+    /// temperature above that of the stress-free body; it may use factors of load steps
+    ///
+    /// One that names no factor is multiplied by that of body forces.
+    pub temperature: Option<Located<Field>>,
     /// known displacement to compare with, one number or expression for each component
     pub exact: Option<Vec<Expression>>,
     /// a region starts with the line [[body.region]]
@@ -64,13 +70,21 @@ pub struct BodySpec {
     /// Factor of the body force at the present load step; 1 without load steps.
     #[serde(skip, default = "one")]
     pub force_factor: f64,
+    /// Factor of the temperature at the present load step; 1 without load steps.
+    #[serde(skip, default = "one")]
+    pub heat_factor: f64,
 }
 
 compile!(BodySpec {
-    name, young, poisson, orthotropic, anisotropic, axes, fix, load, spring, force, exact, regions
-} else { split, order, force_factor });
+    name, young, poisson, orthotropic, anisotropic, axes, fix, load, spring, force, expansion, exact, regions
+} else { temperature, split, order, force_factor, heat_factor } then compile_steps);
 
 impl BodySpec {
+    /// Compile what changes in load steps: the temperature has their factors as variables, beside the coordinates.
+    fn compile_steps(&mut self, names: &Names<'_>) -> Checked<()> {
+        self.temperature.compile(&names.in_steps())
+    }
+
     /// Return an isotropic body on the group of cells `name`. Young's modulus (a stress, > 0) and
     /// Poisson's ratio (in (-1, 0.5)) are numbers or functions of the coordinates.
     #[track_caller]
@@ -78,7 +92,7 @@ impl BodySpec {
         let place = Place::here("young, poisson");
         let [young, poisson] = [young.into(), poisson.into()].map(|field| Some(Located::new(field, place.clone())));
         let name = Located::here(&plain_pattern(name));
-        Self { name, young, poisson, force_factor: 1.0, ..Self::default() }
+        Self { name, young, poisson, force_factor: 1.0, heat_factor: 1.0, ..Self::default() }
     }
 
     /// Let each connected part of the group be a body of its own: `NAME_1`, `NAME_2`, ...
@@ -130,6 +144,14 @@ impl BodySpec {
         self.load(on, LoadKind::Pressure(pressure.into()))
     }
 
+    /// Set the thermal expansion a degree, the same in all directions, and the temperature above that of the
+    /// stress-free body, a number or a function of the coordinates.
+    #[track_caller]
+    pub fn heated(self, expansion: impl Into<Field>, temperature: impl Into<Field>) -> Self {
+        let expansion = Some(Located::new(OneOrVector::One(expansion.into()), Place::here("expansion")));
+        Self { expansion, temperature: Some(Located::new(temperature.into(), Place::here("temperature"))), ..self }
+    }
+
     /// Return the elastic constants and their axes.
     pub fn elasticity(&self) -> ElasticitySpec {
         self.material().elasticity(&self.name.place)
@@ -137,7 +159,27 @@ impl BodySpec {
 
     /// Return the keys of the elasticity.
     fn material(&self) -> Material<'_> {
-        Material::of([&self.young, &self.poisson], &self.orthotropic, &self.anisotropic, &self.axes)
+        Material::of([&self.young, &self.poisson], &self.orthotropic, &self.anisotropic, &self.axes, &self.expansion)
+    }
+
+    /// Check that the body and its regions all have an expansion where there is a temperature, and none without.
+    fn check_heat(&self) -> Checked<()> {
+        let of_regions = self.regions.iter().map(|region| (&region.on, &region.expansion));
+        for (name, expansion) in std::iter::once((&self.name, &self.expansion)).chain(of_regions) {
+            match (expansion, &self.temperature) {
+                (Some(expansion), None) => {
+                    let error = Error::scene(&expansion.place, "`expansion` in a body without `temperature`");
+                    return Err(error.help("give the temperature above that of the stress-free body: temperature = 80"));
+                }
+                (None, Some(temperature)) => {
+                    let message = format!("`temperature` of `{}`, which has no `expansion`", name.value);
+                    let help = "a body and its regions have a thermal expansion a degree: expansion = 1.2e-5, or 0";
+                    return Err(Error::scene(&temperature.place, message).help(help));
+                }
+                _ => {}
+            }
+        }
+        Ok(())
     }
 }
 
@@ -146,6 +188,7 @@ impl Check for BodySpec {
     fn check(&self, geometry: Geometry) -> Result<(), Fault> {
         check_name(&self.name)?;
         self.material().check("[[body]]", geometry)?;
+        self.check_heat()?;
         if let Some(order) = self.order.filter(|order| *order > Order::P2 && !geometry.is_plane()) {
             let help = "bodies in space are of order 1 or 2, in the plane from 1 to 8";
             return Err(Fault::new("order", format!("order {} in space", order.degree()), "", help));

@@ -84,6 +84,8 @@ pub struct ContactSpec {
     /// unloading from there.
     #[serde(default, deserialize_with = "some_table")]
     pub unload: Option<UnloadSpec>,
+    /// stiffness of a bonded layer against slip: traction along the surface over slip
+    pub shear: Option<Field>,
     /// whether the surface `on` is before a rigid obstacle, which is given by the gap
     #[serde(default)]
     pub obstacle: bool,
@@ -111,9 +113,12 @@ pub struct ContactSpec {
     pub overlap: Overlap,
     /// known contact pressure to draw and to compare with
     pub reference: Option<Field>,
-    /// Number of the table in the scene, from 0.
+    /// Number of the table in the scene, from 0; those of [`ContactSpec::slips`] follow.
     #[serde(skip)]
     pub table: usize,
+    /// Direction of the slip, for a pair that is the shear of a bond.
+    #[serde(skip)]
+    pub slip: Option<Slip>,
     /// Factor of forces and motions at the present load step; 1 without load steps.
     #[serde(skip, default = "one")]
     pub factor: f64,
@@ -149,6 +154,7 @@ impl ContactSpec {
             bond: false,
             tension: None,
             unload: None,
+            shear: None,
             obstacle: false,
             approach: None,
             tilt: None,
@@ -160,6 +166,7 @@ impl ContactSpec {
             overlap: Overlap::default(),
             reference: None,
             table: 0,
+            slip: None,
             factor: 1.0,
         }
     }
@@ -178,6 +185,29 @@ impl ContactSpec {
     /// Bond the surfaces: the layer also pulls where it is stretched, by its own law.
     pub fn bonded(self) -> Self {
         Self { bond: true, ..self }
+    }
+
+    /// Return the contacts that are the shear of this bond, in a scene of this dimension: one for each direction along
+    /// the surface, whose layer resists slip as a bond resists compression and stretch.
+    pub fn slips(&self, dimension: usize) -> impl Iterator<Item = Self> {
+        let along = move |(shear, direction): (&Field, usize)| Self {
+            slip: Some(Slip { table: self.table, direction }),
+            layer: LayerSpec::linear(shear.clone()),
+            gap: no_gap(),
+            tension: None,
+            shear: None,
+            force: None,
+            preload: None,
+            path: None,
+            reference: None,
+            ..self.clone()
+        };
+        self.shear.iter().flat_map(move |shear| (1..dimension).map(move |axis| (shear, axis - 1))).map(along)
+    }
+
+    /// Return the number of the table in the scene file.
+    pub fn in_file(&self) -> usize {
+        self.slip.map_or(self.table, |slip| slip.table)
     }
 
     /// Return whether another contact has the same points, where meshes and bodies are the same.
@@ -256,6 +286,15 @@ impl ContactSpec {
     }
 }
 
+/// The direction of slip of a pair that is the shear of a bond.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Slip {
+    /// Number of the table of the bond in the scene.
+    pub table: usize,
+    /// First or second direction along the surface, counted from 0.
+    pub direction: usize,
+}
+
 /// Which of two surfaces carries the contact points of their pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Carrier {
@@ -279,8 +318,8 @@ pub enum Overlap {
     Refuse,
 }
 
-compile!(ContactSpec { between, on, of, layer, tension, unload, at, path, reference } else {
-    gap, approach, force, tilt, moment, distance, angle, edge, touching, bond, obstacle, preload, overlap, table, factor
+compile!(ContactSpec { between, on, of, layer, tension, unload, shear, at, path, reference } else {
+    gap, approach, force, tilt, moment, distance, angle, edge, touching, bond, obstacle, preload, overlap, table, slip, factor
 } then compile_steps);
 
 impl ContactSpec {
@@ -325,6 +364,13 @@ impl Check for ContactSpec {
             let help = "write bond = true, or leave `tension` away";
             return Err(Fault::new("tension", "only a bonded layer has a law in tension", "", help));
         }
+        if let Some(shear) = &self.shear {
+            if !self.bond {
+                let help = "only a bond carries shear: bond = true; a layer that lets go slides without friction";
+                return Err(Fault::new("shear", "`shear` of a layer that is no bond", "", help));
+            }
+            positive("shear", "the stiffness", if shear.is_constant() { shear.number() } else { 1.0 })?;
+        }
         self.distance.map_or(Ok(()), |distance| positive("distance", "the distance", distance))
     }
 }
@@ -336,7 +382,8 @@ impl ContactSpec {
             let help = "facets of different bodies that face each other at most that far apart form pairs";
             return Err(Fault::new("", "[[contact]] has no `distance`", "`distance` is missing", help));
         }
-        let totals = [("force", self.force.is_some()), ("preload", self.preload.is_some())];
+        let totals =
+            [("force", self.force.is_some()), ("preload", self.preload.is_some()), ("shear", self.shear.is_some())];
         if let Some((key, _)) = totals.iter().find(|(_, is_given)| *is_given) {
             let help = "name the two surfaces: between = [\"one\", \"other\"]";
             return Err(Fault::new(*key, format!("`{key}` for pairs that are found"), "", help));
@@ -370,6 +417,7 @@ impl ContactSpec {
                     ("distance", self.distance.is_some()),
                     ("angle", self.angle != angle()),
                     ("touching", self.touching),
+                    ("shear", self.shear.is_some()),
                     ("of", self.of.is_some()),
                 ];
                 if let Some((key, _)) = of_meshes.iter().find(|(_, is_given)| *is_given) {

@@ -4,7 +4,7 @@ use super::check::{Check, Fault, positive};
 use super::compile::compile;
 use super::geometry::Geometry;
 use super::pattern;
-use super::read::{Vector, located, only_one, place};
+use super::read::{OneOrVector, Vector, located, only_one, place};
 use crate::error::{Located, Place, shown};
 use crate::expression::Field;
 use schemars::JsonSchema;
@@ -17,11 +17,13 @@ pub struct ElasticitySpec {
     pub constants: Constants,
     /// Axes 1, 2, 3 of the material; x, y, z if `None`.
     pub axes: Option<AxesSpec>,
+    /// Thermal expansion a degree, along all directions or along each axis.
+    pub expansion: Option<OneOrVector>,
     /// Place of the constants.
     pub place: Place,
 }
 
-/// Constants are equal wherever they stand.
+/// Constants are equal wherever they stand. An expansion is a load, and no part of the stiffness.
 impl PartialEq for ElasticitySpec {
     fn eq(&self, other: &Self) -> bool {
         (&self.constants, &self.axes) == (&other.constants, &other.axes)
@@ -80,9 +82,11 @@ pub struct RegionSpec {
     /// write first = [1, 1, 0] and second = [-1, 1, 0], or angle = "pi/6" and axis = [0, 0, 1]
     #[serde(default, deserialize_with = "located")]
     pub axes: Option<Located<AxesSpec>>,
+    /// thermal expansion a degree, one value or one along each axis, for the `temperature` of the body
+    pub expansion: Option<Located<OneOrVector>>,
 }
 
-compile!(RegionSpec { on, young, poisson, orthotropic, anisotropic, axes } else {});
+compile!(RegionSpec { on, young, poisson, orthotropic, anisotropic, axes, expansion } else {});
 
 impl RegionSpec {
     /// Return the elastic constants and their axes.
@@ -92,7 +96,7 @@ impl RegionSpec {
 
     /// Return the keys of the elasticity.
     fn material(&self) -> Material<'_> {
-        Material::of([&self.young, &self.poisson], &self.orthotropic, &self.anisotropic, &self.axes)
+        Material::of([&self.young, &self.poisson], &self.orthotropic, &self.anisotropic, &self.axes, &self.expansion)
     }
 }
 
@@ -195,6 +199,7 @@ pub(super) struct Material<'a> {
     orthotropic: Option<&'a Located<Orthotropic>>,
     anisotropic: Option<&'a Located<Vec<Field>>>,
     axes: Option<&'a Located<AxesSpec>>,
+    expansion: Option<&'a Located<OneOrVector>>,
 }
 
 /// Advice for the constants of an anisotropic material.
@@ -210,14 +215,23 @@ impl<'a> Material<'a> {
         orthotropic: &'a Option<Located<Orthotropic>>,
         anisotropic: &'a Option<Located<Vec<Field>>>,
         axes: &'a Option<Located<AxesSpec>>,
+        expansion: &'a Option<Located<OneOrVector>>,
     ) -> Self {
         let (young, poisson, axes) = (young.as_ref(), poisson.as_ref(), axes.as_ref());
-        Self { young, poisson, orthotropic: orthotropic.as_ref(), anisotropic: anisotropic.as_ref(), axes }
+        let (orthotropic, anisotropic) = (orthotropic.as_ref(), anisotropic.as_ref());
+        Self { young, poisson, orthotropic, anisotropic, axes, expansion: expansion.as_ref() }
     }
 
     /// Check the keys; `table` is the name of their table in messages.
     pub fn check(&self, table: &str, geometry: Geometry) -> Result<(), Fault> {
-        let Self { young, poisson, orthotropic, anisotropic, axes } = *self;
+        let Self { young, poisson, orthotropic, anisotropic, axes, expansion } = *self;
+        let has_directions = match expansion.map(|expansion| &expansion.value) {
+            Some(OneOrVector::Vector(vector)) if !vector.is_in_space() => {
+                let help = "one value for all directions, or three along the axes 1, 2, 3, also in the plane";
+                return Err(Fault::new("expansion", "an expansion has one value or three", "", help));
+            }
+            expansion => matches!(expansion, Some(OneOrVector::Vector(_))),
+        };
         let [tensor, matrix] =
             [("orthotropic", orthotropic.map(|all| &all.place)), ("anisotropic", anisotropic.map(|all| &all.place))];
         for (key, value) in [("young", young), ("poisson", poisson)] {
@@ -239,6 +253,7 @@ impl<'a> Material<'a> {
         check_isotropic(young.map(|young| &young.value), poisson.map(|poisson| &poisson.value))?;
         match axes {
             None => Ok(()),
+            Some(axes) if has_directions => axes.check(geometry),
             Some(_) => Err(Fault::new(
                 "axes",
                 "axes of an isotropic material",
@@ -266,7 +281,8 @@ impl<'a> Material<'a> {
                 (constants, self.young.map_or(near, |young| &young.place))
             }
         };
-        ElasticitySpec { constants, axes: self.axes.map(|axes| axes.value.clone()), place: place.clone() }
+        let (axes, expansion) = (self.axes.map(|axes| axes.value.clone()), self.expansion.map(|all| all.value.clone()));
+        ElasticitySpec { constants, axes, expansion, place: place.clone() }
     }
 }
 

@@ -103,6 +103,12 @@ impl History {
         let of_step = self.steps.get(step).map(|step| step.factors.clone());
         let factors = of_step.clone().unwrap_or_else(|| vec![1.0; self.names.len().max(1)]);
         contacts.iter_mut().for_each(|contact| contact.set_factors(&factors));
+        let common = of_step.as_ref().map_or(1.0, |_| self.factor(step, None));
+        for body in bodies.iter_mut() {
+            let Some(temperature) = &mut body.temperature else { continue };
+            body.heat_factor = if temperature.factors().next().is_some() { 1.0 } else { common };
+            temperature.value = temperature.in_step(&factors);
+        }
         if of_step.is_none() {
             return;
         }
@@ -115,7 +121,7 @@ impl History {
         for body in bodies {
             body.load.iter_mut().for_each(|load| load.factor = self.factor(step, load.path.as_ref()));
             body.fix.iter_mut().for_each(|fix| fix.factor = self.factor(step, fix.path.as_ref()));
-            body.force_factor = self.factor(step, None);
+            body.force_factor = common;
         }
     }
 }
@@ -149,6 +155,7 @@ fn has_common(body: &BodySpec) -> bool {
         LoadKind::Turning { force, moment } => !force.iter().chain(moment.fields()).all(Field::is_zero),
     };
     body.force.as_ref().is_some_and(|force| !force.iter().all(Field::is_zero))
+        || body.temperature.as_ref().is_some_and(|temperature| !temperature.is_zero())
         || body.load.iter().any(|load| load.path.is_none() && acts(&load.kind))
         || body.fix.iter().any(|fix| fix.path.is_none() && fix.is_moved())
 }
@@ -255,7 +262,9 @@ impl History {
             }
         }
         let is_variable = |name: &str| {
-            let mut factors = contacts.iter().flat_map(ContactSpec::factors);
+            let of_contacts = contacts.iter().flat_map(ContactSpec::factors);
+            let temperatures = bodies.iter().filter_map(|body| body.temperature.as_ref());
+            let mut factors = of_contacts.chain(temperatures.flat_map(|temperature| temperature.factors()));
             factors.any(|factor| self.names[factor] == name)
         };
         let is_unused = |name: &&str| all().all(|path| path.value != **name) && !is_variable(name);
@@ -265,7 +274,7 @@ impl History {
                 format!("no load, support or contact has the path `{unused}` of this table"),
             )
             .help(format!(
-                "path = \"{unused}\" in a line of `load` or `fix`, or in a contact, or the variable `{unused}` in its gap, force or motion; `{COMMON}` is the column of \
+                "path = \"{unused}\" in a line of `load` or `fix`, or in a contact, or the variable `{unused}` in its gap, force or motion or in a temperature; `{COMMON}` is the column of \
                  all lines without"
             )));
         }

@@ -25,6 +25,9 @@ pub fn of(done: &Done, i: usize) -> (Extent, Vec<[f64; 3]>) {
     let (model, layer) = (done.model(), &done.outcome.layer);
     let (pair, range) = (&model.pairs[i], model.range(i));
     let (c, p) = (&layer.compression[range.clone()], &layer.pressure[range]);
+    if done.built.discrete.specs[i].slip.is_some() {
+        return (extent(pair.measure, pair.area.iter().sum(), 0.0), Vec::new());
+    }
     let neighbours = done.built.discrete.contacts[i].surface.neighbours();
     if !pair.measure.is_along_curve() || neighbours.is_empty() {
         let areas = || pair.area.iter().zip(c);

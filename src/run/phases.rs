@@ -15,6 +15,7 @@ use crate::model::{ComplianceStep, Field, INNER_TOLERANCE, JointStep, LinearStep
 use crate::output;
 use crate::parallel::collectively;
 use crate::petsc::Session;
+use crate::problem::ContactSpec;
 use crate::problem::method::{Linear, MethodName, MethodSpec};
 use crate::robin::{Coefficient, SweepCg, stiff_joint_springs};
 use crate::scene::Scene;
@@ -119,6 +120,8 @@ fn build_on(
     let stage = session.stage("discretize");
     let mut stepped = Scene { bodies: mesh.bodies().to_vec(), ..(*scene).clone() };
     scene.method.steps.apply(step, &mut stepped.bodies, &mut stepped.contacts);
+    let slips: Vec<_> = scene.contacts.iter().flat_map(|contact| contact.slips(scene.dimension.value)).collect();
+    slips.into_iter().for_each(|slip| stepped.contacts.push(ContactSpec { table: stepped.contacts.len(), ..slip }));
     let (discrete, solvers, marks) = match before {
         Some(Before { discrete, solvers, step, marks }) => (Some(discrete), Some((solvers, step)), marks),
         None => (None, None, Vec::new()),

@@ -237,7 +237,7 @@ fn pair_report(done: &Done, i: usize, approach: Option<f64>, estimate: Option<&E
     PairReport {
         surfaces: discrete.specs[i].between.each_ref().map(|name| name.value.clone()),
         bodies: discrete.sides(i).map(|side| model.bodies[pair.bodies[side]].name.clone()),
-        contact: discrete.specs[i].table,
+        contact: discrete.specs[i].in_file(),
         points: pair.len(),
         carrier: pair.surfaces[0].clone(),
         facets_uncovered: pair.uncovered(),
@@ -271,6 +271,7 @@ pub fn contact_table(done: &Done, estimate: Option<&Estimate>, i: usize) -> Cont
         points: pair.position.clone(),
         weight: pair.area.clone(),
         gap: pair.gap.clone(),
+        is_slip: done.built.discrete.specs[i].slip.is_some(),
         compression: outcome.layer.compression[range.clone()].to_vec(),
         compression_max: if pair.law.has_memory() && !done.largest.is_empty() {
             done.largest[range.clone()].to_vec()
@@ -322,17 +323,21 @@ pub fn surface_displacements(done: &Done, recovered: &All) -> Result<Vec<Vec<[f6
 }
 
 /// Return the surface of pair `i` with gap, compression, pressure, normal (from side a to side b) and area (length) of
-/// the points, and with the `displacement` of side a.
+/// the points, for the shear of a bond slip, traction and its direction, and with the `displacement` of side a.
 pub fn contact_surface(name: &str, done: &Done, i: usize, displacement: &[[f64; 3]]) -> UnstructuredGrid {
     let (model, layer) = (done.model(), &done.outcome.layer);
     let (pair, range) = (&model.pairs[i], model.range(i));
+    let [closing, force, along] = match done.built.discrete.specs[i].slip {
+        Some(_) => ["slip", "traction", "tangent"],
+        None => ["compression", "pressure", "normal"],
+    };
     let mut grid = done.built.discrete.contacts[i].surface.grid(
         name.to_owned(),
         vec![
             FieldArray::new("gap", 1, pair.gap.clone()),
-            FieldArray::new("compression", 1, layer.compression[range.clone()].to_vec()),
-            FieldArray::new("pressure", 1, layer.pressure[range].to_vec()),
-            FieldArray::new("normal", 3, pair.normal.as_flattened().to_vec()),
+            FieldArray::new(closing, 1, layer.compression[range.clone()].to_vec()),
+            FieldArray::new(force, 1, layer.pressure[range].to_vec()),
+            FieldArray::new(along, 3, pair.normal.as_flattened().to_vec()),
             FieldArray::new(pair.measure.name(), 1, pair.area.clone()),
         ],
     );

@@ -209,7 +209,8 @@ pub fn pair_names(built: &Built) -> Vec<String> {
     let model = &built.discrete.model;
     let names = (0..model.pairs.len()).map(|i| {
         let [a, b] = built.discrete.sides(i).map(|side| &model.bodies[model.pairs[i].bodies[side]].name);
-        format!("{a}-{b}")
+        let slip = if built.discrete.specs[i].slip.is_some() { "-shear" } else { "" };
+        format!("{a}-{b}{slip}")
     });
     numbered(names)
 }
@@ -310,6 +311,7 @@ pub fn pair(done: &Done, i: usize, approach: Option<f64>) -> PairResult {
     let opening: Vec<f64> = c.iter().map(|c| (-c).max(0.0)).collect();
     let [least_gap, largest_gap] = range_of(pair.gap.iter().copied());
     PairResult {
+        shear: done.built.discrete.specs[i].slip.is_some(),
         closed: closed().count(),
         force: sides.map(|side| resultant(force, &pair.resultant[side])),
         moment: sides.map(|side| resultant(force, &pair.moment[side])),

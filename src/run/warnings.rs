@@ -164,7 +164,9 @@ fn names(spec: &ContactSpec) -> [&str; 2] {
 /// Return the warnings of the surfaces of all pairs.
 fn of_surfaces(discrete: &Discrete) -> Vec<String> {
     let mut warnings = Vec::new();
-    for (i, (pair, spec)) in discrete.model.pairs.iter().zip(&discrete.specs).enumerate() {
+    let all = discrete.model.pairs.iter().zip(&discrete.specs).enumerate();
+    // the shear of a bond has the surfaces of the bond
+    for (i, (pair, spec)) in all.filter(|(_, (_, spec))| spec.slip.is_none()) {
         warnings.extend(lost(discrete, i));
         // who types a negative gap, as for a fit, knows that bodies overlap there; that of an obstacle says how far it
         // reaches into the body
@@ -186,6 +188,9 @@ fn of_surfaces(discrete: &Discrete) -> Vec<String> {
 /// facets are usual, and `check` counts them.
 pub fn cut_short(done: &Done, i: usize) -> Option<String> {
     let (pair, spec) = (&done.model().pairs[i], &done.built.discrete.specs[i]);
+    if spec.slip.is_some() {
+        return None;
+    }
     let pressure = &done.outcome.layer.pressure[done.model().range(i)];
     let [a, b] = names(spec);
     let distance = spec.distance.map_or(String::new(), |distance| format!(" and `distance` = {distance}"));

@@ -14,14 +14,14 @@ const KEYS: &[(&str, &str, &str)] = &[
         "output",
         "VTU files are written as they are: `precision = \"single\"` halves them, `tar czf` compresses a folder",
     ),
+    ("conductivity", "body", "there is no heat conduction: a temperature is a number, an expression or data"),
     ("density", "body", "give a weight as force = [0, 0, -DENSITY*GRAVITY], a force a unit of volume"),
     ("depth", "method", "the method `anderson`, which had it, is gone"),
-    ("expansion", "body", HEAT),
     ("fill", "data", HEIGHTS),
     (
         "friction",
         "contact",
-        "contact is without friction: surfaces slide freely, and a bond carries normal forces alone",
+        "contact is without friction: surfaces slide freely, and bond = true with shear = K is glue, which resists slip",
     ),
     ("memory", "mesh", "Gmsh has `timeout` alone; the shell limits memory: ulimit -v"),
     ("missing", "data", HEIGHTS),
@@ -31,10 +31,10 @@ const KEYS: &[(&str, &str, &str)] = &[
     ("parabola", "data", HEIGHTS),
     ("plastic", "body", "bodies are linearly elastic"),
     ("points", "data", HEIGHTS),
-    ("shear", "contact", "a layer carries normal forces alone"),
+    ("shear", "layer", "shear = K stands beside bond = true in [[contact]]"),
     ("spectral", "method", "gamma = \"aitken\" or \"line-search\""),
-    ("temperature", "body", HEAT),
-    ("thermal_expansion", "body", HEAT),
+    ("temperature", "contact", "temperature = T belongs to a body, with expansion = ALPHA"),
+    ("thermal_expansion", "body", "expansion = ALPHA, with temperature = T"),
     ("yield", "body", "bodies are linearly elastic: compare the largest von Mises stress with the yield stress"),
 ];
 
@@ -59,9 +59,6 @@ pub const OPTIONS: &[(&str, &str)] = &[
     ),
     ("report", "`winkler solve --report` writes the page of a run"),
 ];
-
-/// Advice for heat.
-const HEAT: &str = "heat is not computed: a uniform change of temperature between bodies may be given as a `gap`";
 
 /// Advice for methods over the sweep.
 const SWEEPS: &str = "name = \"auto\", or \"robin\" with gamma = \"aitken\"";

@@ -163,7 +163,7 @@ impl<const D: usize> Recovery<'_, D> {
             for (l, weight) in rule.iter() {
                 let (phi, slopes) = (element::values(space.order, l), element::derivatives(space.order, l));
                 let at = element::interpolate(&x, &phi);
-                let strain = self.recovered_slope(nodes, l, &at).strain();
+                let strain = self.elastic(cell, at, &self.recovered_slope(nodes, l, &at).strain());
                 let stress = self.stress(cell, at, &strain);
                 let (weight, height) = (weight * size * space.circle(&at), rise.dot(&products(l)));
                 energies[cell] += weight * height.abs() * dot(&stress, &strain);
