@@ -73,6 +73,18 @@ fn free_expansion_has_no_stress() {
     }
     let run = patch(case("patch"), "1e-5", &[]);
     assert!(near(largest(&run), 210.0, 1e-12), "{}", largest(&run));
+    // in axes turned by 45 degrees a strain along the first is as much of shear
+    let sets = [
+        "plane='stress'",
+        "body.lower.expansion=[1e-5,0,0]",
+        "body.lower.axes={angle='pi/4'}",
+        "body.lower.temperature=100",
+        "body.lower.exact=['5e-4*x + 1e-3*y','5e-4*y']",
+        "body.upper.load=[]",
+        "method={}",
+    ];
+    let run = solve_here(case("patch"), &sets).converged();
+    assert!(run.number("bodies/0/error_l2") < 1e-10, "{}", run["bodies"][0]["error_l2"]);
     // the load adds its own stresses
     let keys = keys("[1e-5,3e-5,-2e-5]").concat();
     let sets: Vec<&str> = keys.iter().map(String::as_str).collect();
