@@ -169,6 +169,9 @@ pub trait Factory {
     /// their indices are in increasing order. Bodies that stay whole are in no set.
     fn distributed(&self) -> Vec<Vec<usize>>;
 
+    /// Return whether the plan eliminates unknowns of a body, so that contact rows with few entries pay.
+    fn eliminates(&self, body: usize) -> bool;
+
     /// Return whether the plan needs the interpolation of a body from linear displacements.
     fn wants_interpolation(&self, name: &str) -> bool;
 

@@ -17,6 +17,7 @@ use crate::contact::pieces::Cut;
 use crate::contact::{self, ContactPair};
 use crate::error::Result;
 use crate::exchange::Plain;
+use crate::fem::Frame;
 use crate::fem::rigid::AtDofs;
 use crate::mesh::BodyCheck;
 use crate::model::{BodyFacts, BodySlot, InterfaceDofs, Mechanism, slenderness};
@@ -131,7 +132,7 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     let has_matrix =
         |(i, body): (usize, &MatrixInputs<D>)| before.bodies.get(i).is_some_and(|it| body.has_matrix_of(it));
     let mut is_kept: Vec<bool> = kept.bodies.iter().enumerate().map(has_matrix).collect();
-    let plan = plan(&bodies, &verified.checked, factory, &mut is_kept)?;
+    let plan = plan_in_contact_axes(&mut bodies, &mut pairs, &verified.checked, factory, &mut is_kept)?;
     kept.partitions = partitions(&bodies, &pairs, factory, ranks, (before.partitions, &is_kept));
     kept.owners = owners(&bodies, &kept.partitions, ranks);
     for (index, (owner, ranks)) in kept.owners.iter().enumerate() {
@@ -145,6 +146,24 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     let shared =
         ReplicatedProblem { bodies: shared, pairs, rigid, contacts, mechanisms, fine, plan, is_kept, searched };
     Ok((shared, WholeProblem { bodies, partitions: kept.partitions.clone(), keep }))
+}
+
+/// Turn nodes to their contact normals, and make the factory's plan, for which that counts. Turn the nodes of bodies
+/// back that are not eliminated: multigrid needs the same axes at all nodes. See [`plan`].
+fn plan_in_contact_axes<const D: usize, F: Factory>(
+    bodies: &mut [WholeBody<D>],
+    pairs: &mut [ContactPair],
+    checked: &[BodyCheck],
+    factory: &mut F,
+    is_kept: &mut [bool],
+) -> Result<F::SolverPlan> {
+    let frames: Vec<Frame<D>> = bodies.iter().map(|body| body.part.mesh.held.frame.clone()).collect();
+    bodies.iter_mut().for_each(|body| body.set_frame(body.part.mesh.contact_frame(), pairs));
+    let plan = plan(bodies, checked, factory, is_kept)?;
+    for (_, (body, frame)) in bodies.iter_mut().zip(frames).enumerate().filter(|(i, _)| !factory.eliminates(*i)) {
+        body.set_frame(frame, pairs);
+    }
+    Ok(plan)
 }
 
 /// Return the factory's plan of the solvers of all bodies. `is_kept` says whether each has the matrix of the problem
@@ -162,7 +181,7 @@ fn plan<const D: usize, F: Factory>(
         let (spec, mesh) = (part.spec, &part.mesh);
         let at = |k: usize, dof: usize| mesh.dof_of(&rigid_modes[k], dof);
         let motions = AtDofs { count: rigid_modes.len(), at: &at };
-        let interface = InterfaceDofs::new(D, &mesh.rows, &mesh.prescribed(), motions);
+        let interface = InterfaceDofs::new(&mesh.rows, &mesh.prescribed(), motions);
         let facts = BodyFacts {
             name: spec.name.value.clone(),
             dimension: D,

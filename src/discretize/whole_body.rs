@@ -5,7 +5,7 @@ use super::approach;
 use super::scene_body::SceneBody;
 use crate::contact::ContactPair;
 use crate::error::Result;
-use crate::fem::{NodalForces, RigidMotion, rigid};
+use crate::fem::{Frame, NodalForces, RigidMotion, rigid};
 use crate::linalg::{Blocks, Csr, PART, TOLERANCE, dot};
 use crate::mesh::Mesh;
 use crate::model::{Motion, Segment, Sprung, motions::combined};
@@ -73,6 +73,18 @@ impl<'a, const D: usize> WholeBody<'a, D> {
             all
         };
         (self.part.mesh.rows, self.part.mesh.nodal_rows) = (rows(|pair| &pair.rows), rows(|pair| &pair.nodal));
+    }
+
+    /// Put the contact rows and loads of the body into the dofs of a frame.
+    pub fn set_frame(&mut self, frame: Frame<D>, pairs: &mut [ContactPair]) {
+        if frame == self.part.mesh.held.frame {
+            return;
+        }
+        self.part.mesh.held.frame = frame;
+        let held = &self.part.mesh.held;
+        self.segments.iter().for_each(|segment| pairs[segment.pair].hold(segment.side, &held.frame, &held.prescribed));
+        self.collect_rows(pairs);
+        self.load = self.part.mesh.load_on_dofs();
     }
 
     /// Return the names of the motions that neither supports nor springs nor any contact row of the body resist.

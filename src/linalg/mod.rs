@@ -126,6 +126,16 @@ impl Csr {
         self.range(i).map(|k| (self.col[k] as usize, self.values[k]))
     }
 
+    /// Return the lower triangle of a square matrix as (row, column, value). Zeros are left out, except on the diagonal.
+    pub fn lower_triangle(&self) -> Vec<(usize, usize, f64)> {
+        let mut lower = Vec::with_capacity(self.values.len() / 2 + self.rows());
+        for i in 0..self.rows() {
+            let row = self.row(i).take_while(|&(j, _)| j <= i).filter(|&(j, value)| value != 0.0 || i == j);
+            lower.extend(row.map(|(j, value)| (i, j, value)));
+        }
+        lower
+    }
+
     /// Compute y = A x.
     pub fn multiply(&self, x: &[f64], y: &mut [f64]) {
         debug_assert_eq!(x.len(), self.columns);
