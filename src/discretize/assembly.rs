@@ -119,7 +119,7 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
         let mut body = part.assemble(self.mesh, &graph, load, prescribed)?;
         drop(graph);
         slot.scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
-        slot.row_stiffness = rows.quadratic_diagonal(&body.stiffness);
+        slot.row_stiffness = rows.stiffness_of_nodes(&body.stiffness, D);
         if let Some(owned) = &owned {
             body = owned.restrict::<D>(body);
         }

@@ -177,9 +177,17 @@ impl Csr {
         rows
     }
 
-    /// Return b diag(K) b' of each row b, for a square K.
-    pub fn quadratic_diagonal(&self, k: &Csr) -> Vec<f64> {
-        (0..self.rows()).map(|q| self.row(q).map(|(i, b)| b * b * k.diagonal(i)).sum()).collect()
+    /// Return b K b' of each row b, with those entries of a square K alone that couple `dimension` dofs of one node.
+    pub fn stiffness_of_nodes(&self, k: &Csr, dimension: usize) -> Vec<f64> {
+        let at = |i: usize, j: usize| k.position(i, j).map_or(0.0, |at| k.values[at]);
+        let of_node = |entries: &[(usize, f64)]| -> f64 {
+            entries.iter().flat_map(|&(i, b)| entries.iter().map(move |&(j, c)| b * c * at(i, j))).sum()
+        };
+        let of_row = |q: usize| {
+            let row: Vec<(usize, f64)> = self.row(q).collect();
+            row.chunk_by(|a, b| a.0 / dimension == b.0 / dimension).map(of_node).sum()
+        };
+        (0..self.rows()).map(of_row).collect()
     }
 
     /// Return the diagonal entry of row i, zero if the pattern does not have it.

@@ -113,7 +113,7 @@ pub struct BodySlot {
     pub modulus: f64,
     /// Its size normal to its contact surfaces.
     pub depth: f64,
-    /// b diag(K) b' of each contact row b: the stiffness of the nodes under a point.
+    /// b K b' of each contact row b, without what couples different nodes: the stiffness of the nodes under a point.
     pub row_stiffness: Vec<f64>,
     /// B m on the contact rows, for the rigid motion m that comes nearest to the prescribed displacements.
     pub imposed: Vec<f64>,
