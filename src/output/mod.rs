@@ -10,6 +10,7 @@ pub mod folder;
 mod mark;
 pub mod plot;
 pub mod report;
+mod status;
 pub mod tables;
 pub mod terminal;
 pub mod views;
@@ -24,6 +25,7 @@ pub use report::{
     BalanceReport, BodyReport, EstimateReport, Extent, ForceReport, InnerTimes, IntervalReport, LISTED, ObstacleReport,
     PairReport, ReactionReport, Report, RoundReport, StepPairReport, StepReport, TensionReport, UnmetReport, busiest,
 };
+pub use status::RunStatus;
 pub use tables::{ContactTable, HistoryWriter, PairRow, ResultNames, RowFile, StepTable};
 pub use terminal::IterationTable;
 

@@ -190,7 +190,7 @@ impl StepTable {
         let dimension = self.names.dimension;
         let mut line = vec![count("step", self.count), number("time", step.time)];
         line.extend(self.factors.iter().map(|name| number(name, step.factors.get(name).copied())));
-        line.push(("status".to_owned(), step.status.clone()));
+        line.push(("status".to_owned(), step.status.to_string()));
         line.extend([count("iterations", step.iterations), number("residual", step.residual)]);
         for (pair, name) in step.pairs.iter().zip(&self.names.pairs) {
             line.extend(vector("force", name, &pair.force, dimension));

@@ -7,8 +7,8 @@ pub use surface::Surface;
 
 use crate::output::closing::orders;
 use crate::output::{
-    BodyReport, ForceReport, Mark, ObstacleReport, PairReport, Plot, Report, Role, RoundReport, UNSETTLED, escape,
-    trimmed,
+    BodyReport, ForceReport, Mark, ObstacleReport, PairReport, Plot, Report, Role, RoundReport, RunStatus, UNSETTLED,
+    escape, trimmed,
 };
 use crate::problem::{Units, label};
 use serde_json::Value;
@@ -117,8 +117,11 @@ impl Page<'_> {
             title = escape(&report.title),
             style = include_str!("style.css"),
             status = report.status,
-            message =
-                if report.status == "converged" { String::new() } else { format!(": {}", escape(&report.message)) },
+            message = if report.status == RunStatus::Converged {
+                String::new()
+            } else {
+                format!(": {}", escape(&report.message))
+            },
             summary = self.summary(),
             warnings = warnings(&report.warnings),
             fields = self.fields(),

@@ -1,7 +1,7 @@
 //! The report and the contact tables of a run, from its outcome.
 
 use super::stages::{All, Built, Clock, Done};
-use super::verdict::{self, message, status_name};
+use super::verdict::{self, message};
 use super::{extent, results, warnings};
 use crate::ddm::{Outcome, Row, Status};
 use crate::discretize::{BodyInfo, Discrete};
@@ -12,7 +12,7 @@ use crate::exchange::{all_gather, gather};
 use crate::linalg::axpy;
 use crate::model::{Body, BodyCounts, Model};
 use crate::output::{
-    BodyReport, ContactTable, EstimateReport, FieldArray, InnerTimes, IntervalReport, PairReport, Report,
+    BodyReport, ContactTable, EstimateReport, FieldArray, InnerTimes, IntervalReport, PairReport, Report, RunStatus,
     UnstructuredGrid,
 };
 use crate::petsc::Session;
@@ -57,7 +57,7 @@ pub fn report(session: &Session, done: &Done, recovered: &All, clock: &Clock) ->
 /// Add the status and the results of the iteration.
 fn add_outcome(report: &mut Report, outcome: &Outcome, model: &Model) {
     let last = outcome.rows.last();
-    report.status = status_name(&outcome.status).to_owned();
+    report.status = RunStatus::from(&outcome.status);
     report.message = message(outcome, model);
     report.method = outcome.method.to_owned();
     report.linear_step = outcome.linear_step.clone();
