@@ -212,3 +212,24 @@ fn common_direction<const D: usize>(vectors: &[[f64; D]]) -> Option<[f64; D]> {
     let aside = |vector: &[f64; D]| length(minus(*vector, unit.map(|n| dot(vector, &unit) * n)));
     vectors.iter().all(|vector| aside(vector) <= ENTRY_ROUNDING * size).then_some(unit)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::common_direction;
+    use crate::fem::completed;
+    use crate::linalg::dot;
+
+    #[test]
+    fn a_plane_has_one_normal_and_a_corner_two() {
+        let normal = [2.0 / 3.0, -2.0 / 3.0, 1.0 / 3.0];
+        let shares = [0.5, 1.0, -0.1, 1e-8].map(|share| normal.map(|n| share * n));
+        let found = common_direction(&shares).expect("a normal");
+        let axes = completed(vec![found]);
+        for (i, a) in axes.iter().enumerate() {
+            let products = axes.iter().map(|b| dot(a, b)).enumerate();
+            products.for_each(|(j, product)| assert!((product - f64::from(u8::from(i == j))).abs() < 1e-15));
+            assert!((dot(a, &normal) - f64::from(u8::from(i == 0))).abs() < 1e-15);
+        }
+        assert_eq!(common_direction(&[normal, [0.0, 0.0, 0.5]]), None);
+    }
+}
