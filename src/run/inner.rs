@@ -147,7 +147,7 @@ impl<'a> SolverFactory<'a> {
     fn keep_solvers(&self, is_kept: &mut [bool]) {
         let Some(Solvers { plan: before, asked }) = &self.before else { return };
         let is_linear_same = self.has_same_steps();
-        for (index, is_kept) in is_kept.iter_mut().enumerate() {
+        for (index, is_kept) in is_kept.iter_mut().enumerate().take(before.bodies.len()) {
             let of = |plan: &Plan| (plan.bodies[index].preset, plan.bodies[index].is_distributed);
             // the axes of contact nodes depend on that
             let has_same_dofs = self.eliminates(index) == eliminates(before, asked, index);
