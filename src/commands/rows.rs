@@ -54,7 +54,7 @@ impl From<&Report> for CaseRow {
         let time = |phase: &str| report.times.get(phase).copied();
         let error = largest(|body| body.error_l2);
         Self {
-            status: report.status.clone(),
+            status: report.status.to_string(),
             message: report.message.clone(),
             method: report.method.clone(),
             dofs: Some(report.dofs),
@@ -189,7 +189,7 @@ mod tests {
             ..PairReport::default()
         };
         let written = Report {
-            status: "converged".to_owned(),
+            status: crate::output::RunStatus::Converged,
             message: "a, b".to_owned(),
             residual: Some(1e-9),
             dofs: 12,

@@ -1,6 +1,6 @@
 //! The end of an adaptation above the error that was asked for: its status, message and exit code.
 
-use crate::output::Report;
+use crate::output::{Report, RunStatus};
 use serde::{Deserialize, Serialize};
 
 /// Why an adaptation ends above the error that was asked for, in words.
@@ -17,10 +17,10 @@ impl Shortfall {
     /// Give a report of a run that found a solution the status and the message of this end.
     pub fn put_into(&self, report: &mut Report) {
         let (status, message) = match self {
-            Self::Limit(limit) => ("mesh-limit", format!("the error asked for is not reached: {limit}")),
-            Self::SharpEnds(ends) => ("tolerance-unmet", format!("{}, but {ends}", report.message)),
+            Self::Limit(limit) => (RunStatus::MeshLimit, format!("the error asked for is not reached: {limit}")),
+            Self::SharpEnds(ends) => (RunStatus::ToleranceUnmet, format!("{}, but {ends}", report.message)),
         };
-        (report.status, report.message) = (status.to_owned(), message);
+        (report.status, report.message) = (status, message);
     }
 
     /// Return the exit code of a run that found a solution.

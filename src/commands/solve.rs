@@ -12,7 +12,7 @@ use crate::estimate::Estimate;
 use crate::interrupt::Interrupt;
 use crate::output::terminal::ProgressLine;
 use crate::output::{
-    Folder, HistoryWriter, IterationTable, Report, RoundReport, RowFile, StepTable, say, warning_lines,
+    Folder, HistoryWriter, IterationTable, Report, RoundReport, RowFile, RunStatus, StepTable, say, warning_lines,
 };
 use crate::parallel::{Ranks, collectively};
 use crate::petsc::Session;
@@ -193,7 +193,7 @@ impl Solver<'_> {
         };
         let mut clock = self.clock.clone();
         let (_, written) = self.files(&done, estimate.as_ref(), false).write(&mut clock, |report| {
-            (report.status, report.message) = ("interrupted".to_owned(), ended.to_owned());
+            (report.status, report.message) = (RunStatus::Interrupted, ended.to_owned());
         });
         self.clock = clock;
         self.note(written);

@@ -304,6 +304,10 @@ pub fn add(sum: &mut [f64; 3], v: [f64; 3]) {
     sum.iter_mut().zip(v).for_each(|(sum, v)| *sum += v);
 }
 
+/// Size up to which an entry of a contact row is rounding, where shares of nodes sum to one. Normals of facets in one
+/// plane differ by 1e-16; four digits are left for coordinates of a mesh far from the origin.
+pub const ENTRY_ROUNDING: f64 = 1e-12;
+
 /// Share of a node in a point at or below which it is noise of the mesher's coordinates.
 const NOISE: f64 = 1e-9;
 
@@ -367,7 +371,7 @@ impl ContactPair {
                 let mut entry = [0.0; D];
                 at_node.iter().for_each(|(i, value)| entry[i % D] = *value);
                 for (node, dofs) in frame.force((at_node[0].0 / D) as u32, entry) {
-                    for (c, value) in dofs.into_iter().enumerate() {
+                    for (c, value) in dofs.into_iter().enumerate().filter(|(_, value)| value.abs() > ENTRY_ROUNDING) {
                         *entries.entry(D * node as usize + c).or_insert(0.0) += value;
                     }
                 }

@@ -125,7 +125,7 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
         let mut body = elastic_body(spec, fem, &self.mesh.path, &graph, loads, prescribed)?;
         drop(graph);
         slot.scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
-        slot.row_stiffness = rows.quadratic_diagonal(&body.stiffness);
+        slot.row_stiffness = rows.stiffness_of_nodes(&body.stiffness, D);
         if let Some(owned) = &owned {
             body = owned.restrict::<D>(body);
         }
@@ -237,6 +237,9 @@ pub trait Factory {
     /// Return the sets of bodies whose nodes the plan distributes over the ranks. Bodies of one set share a matrix;
     /// their indices are in increasing order. Bodies that stay whole are in no set.
     fn distributed(&self) -> Vec<Vec<usize>>;
+
+    /// Return whether the plan eliminates unknowns of a body, so that contact rows with few entries pay.
+    fn eliminates(&self, body: usize) -> bool;
 
     /// Return whether the plan needs the interpolation of a body from linear displacements.
     fn wants_interpolation(&self, name: &str) -> bool;

@@ -3,13 +3,18 @@
 
 use super::owned_dofs::OwnedDofs;
 use super::supports::Constraints;
+use crate::contact::ENTRY_ROUNDING;
 use crate::exchange::Plain;
 use crate::fem::interpolation::{coarse_nodes, from_vertices};
-use crate::fem::{NodalBlock, NodalForces, NodeGraph, PointExtent, Prolongation, RigidMotion, Space, rigid};
+use crate::fem::{
+    Frame, NodalBlock, NodalForces, NodeGraph, PointExtent, Prolongation, RigidMotion, Space, completed, length, minus,
+    rigid,
+};
 use crate::linalg::{Blocks, Csr, TOLERANCE, dot};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use std::cell::OnceCell;
+use std::collections::{BTreeMap, HashSet};
 use std::rc::Rc;
 
 /// A body on its mesh, or the part of it on the nodes that a rank needs, with local numbers.
@@ -61,6 +66,34 @@ impl<const D: usize> BodyMesh<D> {
     /// Return the coupling of the nodes by K, which is computed when it is first requested.
     pub fn graph(&self) -> &NodeGraph {
         self.graph.get_or_init(|| NodeGraph::with_rows(&self.space, &self.rows, &self.held.frame))
+    }
+
+    /// Return the frame in which nodes have their contact normal as first axis, so that contact rows have one entry
+    /// there. These are nodes without a constraint whose rows have all the same normal, which is along no axis of the
+    /// scene.
+    pub fn contact_frame(&self) -> Frame<D> {
+        let mut normals: BTreeMap<u32, Vec<[f64; D]>> = BTreeMap::new();
+        for q in 0..self.nodal_rows.rows() {
+            let row: Vec<(usize, f64)> = self.nodal_rows.row(q).collect();
+            for at_node in row.chunk_by(|p, q| p.0 / D == q.0 / D) {
+                let mut normal = [0.0; D];
+                at_node.iter().for_each(|(i, value)| normal[i % D] = *value);
+                normals.entry((at_node[0].0 / D) as u32).or_default().push(normal);
+            }
+        }
+        let mut frame = self.held.frame.clone();
+        let leaders: HashSet<u32> = frame.leaders().collect();
+        for (node, normals) in normals {
+            let mut dofs = D * node as usize..D * (node as usize + 1);
+            let is_free = dofs.all(|dof| !self.held.prescribed.contains_key(&dof))
+                && frame.row(node).is_empty()
+                && !leaders.contains(&node);
+            let is_inclined = |normal: &[f64; D]| normal.iter().filter(|n| **n != 0.0).count() > 1;
+            if let Some(normal) = common_direction(&normals).filter(|normal| is_free && is_inclined(normal)) {
+                frame.turn(node, completed(vec![normal]), &[]);
+            }
+        }
+        frame
     }
 
     /// Return the displacements of all dofs in a rigid motion.
@@ -180,5 +213,35 @@ impl<const D: usize> BodyMesh<D> {
     /// Return the interpolation of the dofs from those at these nodes.
     pub fn interpolation(&self, coarse: &[u32]) -> Prolongation {
         from_vertices(&self.space, &self.held.frame, |dof| self.held.prescribed.contains_key(&dof), coarse)
+    }
+}
+
+/// Return the unit vector of which all vectors are multiples up to rounding, if there is one.
+fn common_direction<const D: usize>(vectors: &[[f64; D]]) -> Option<[f64; D]> {
+    let longest = vectors.iter().max_by(|a, b| length(**a).total_cmp(&length(**b)))?;
+    let size = length(*longest);
+    let unit = longest.map(|x| x / size);
+    let aside = |vector: &[f64; D]| length(minus(*vector, unit.map(|n| dot(vector, &unit) * n)));
+    vectors.iter().all(|vector| aside(vector) <= ENTRY_ROUNDING * size).then_some(unit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::common_direction;
+    use crate::fem::completed;
+    use crate::linalg::dot;
+
+    #[test]
+    fn a_plane_has_one_normal_and_a_corner_two() {
+        let normal = [2.0 / 3.0, -2.0 / 3.0, 1.0 / 3.0];
+        let shares = [0.5, 1.0, -0.1, 1e-8].map(|share| normal.map(|n| share * n));
+        let found = common_direction(&shares).expect("a normal");
+        let axes = completed(vec![found]);
+        for (i, a) in axes.iter().enumerate() {
+            let products = axes.iter().map(|b| dot(a, b)).enumerate();
+            products.for_each(|(j, product)| assert!((product - f64::from(u8::from(i == j))).abs() < 1e-15));
+            assert!((dot(a, &normal) - f64::from(u8::from(i == 0))).abs() < 1e-15);
+        }
+        assert_eq!(common_direction(&[normal, [0.0, 0.0, 0.5]]), None);
     }
 }

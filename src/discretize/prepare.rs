@@ -16,6 +16,7 @@ use crate::contact::pieces::Cut;
 use crate::contact::{self, ContactPair};
 use crate::error::Result;
 use crate::exchange::Plain;
+use crate::fem::Frame;
 use crate::fem::rigid::AtDofs;
 use crate::mesh::BodyCheck;
 use crate::model::{BodyFacts, BodySlot, InterfaceDofs, Mechanism, slenderness};
@@ -132,7 +133,7 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     let has_matrix =
         |(i, body): (usize, &MatrixInputs<D>)| before.bodies.get(i).is_some_and(|it| body.has_matrix_of(it));
     let mut is_kept: Vec<bool> = kept.bodies.iter().enumerate().map(has_matrix).collect();
-    let plan = plan(&bodies, &verified.checked, factory, &mut is_kept)?;
+    let plan = plan_in_contact_axes(&mut bodies, &mut pairs, &verified.checked, factory, &mut is_kept)?;
     kept.partitions = partitions(&bodies, &pairs, factory, ranks, (before.partitions, &is_kept));
     kept.owners = owners(&bodies, &kept.partitions, ranks);
     is_kept.iter_mut().enumerate().for_each(|(i, is_kept)| *is_kept &= before.owners.get(i) == Some(&kept.owners[i]));
@@ -143,6 +144,24 @@ pub fn prepare<'a, const D: usize, F: Factory>(
         ReplicatedProblem { bodies: shared, pairs, rigid, contacts, mechanisms, fine, plan, is_kept, searched };
     let (owners, partitions) = (kept.owners.clone(), kept.partitions.clone());
     Ok((shared, WholeProblem { bodies, owners, partitions, keep }))
+}
+
+/// Turn nodes to their contact normals, and make the factory's plan, for which that counts. Turn the nodes of bodies
+/// back that are not eliminated: multigrid needs the same axes at all nodes. See [`plan`].
+fn plan_in_contact_axes<const D: usize, F: Factory>(
+    bodies: &mut [SceneBody<D>],
+    pairs: &mut [ContactPair],
+    checked: &[BodyCheck],
+    factory: &mut F,
+    is_kept: &mut [bool],
+) -> Result<F::SolverPlan> {
+    let frames: Vec<Frame<D>> = bodies.iter().map(|body| body.mesh.held.frame.clone()).collect();
+    bodies.iter_mut().for_each(|body| body.set_frame(body.mesh.contact_frame(), pairs));
+    let plan = plan(bodies, checked, factory, is_kept)?;
+    for (_, (body, frame)) in bodies.iter_mut().zip(frames).enumerate().filter(|(i, _)| !factory.eliminates(*i)) {
+        body.set_frame(frame, pairs);
+    }
+    Ok(plan)
 }
 
 /// Return the factory's plan of the solvers of all bodies. `is_kept` says whether each has the matrix of the problem
@@ -160,7 +179,7 @@ fn plan<const D: usize, F: Factory>(
         let rigid_modes = mesh.rigid_modes();
         let at = |k: usize, dof: usize| mesh.dof_of(&rigid_modes[k], dof);
         let motions = AtDofs { count: rigid_modes.len(), at: &at };
-        let interface = InterfaceDofs::new(D, &mesh.rows, &mesh.prescribed(), motions);
+        let interface = InterfaceDofs::new(&mesh.rows, &mesh.prescribed(), motions);
         let facts = BodyFacts {
             name: spec.name.value.clone(),
             dimension: D,

@@ -10,7 +10,7 @@ use crate::contact::{ContactPair, Side};
 use crate::error::{Error, Result, shown};
 use crate::expression::Field;
 use crate::fem::elasticity::Flaw;
-use crate::fem::{Elasticity, Facets, NodalForces, PointExtent, RigidMotion, Space, assemble, surface};
+use crate::fem::{Elasticity, Facets, Frame, NodalForces, PointExtent, RigidMotion, Space, assemble, surface};
 use crate::linalg::{Csr, PART, Total};
 use crate::mesh::{self, Group, Mesh};
 use crate::model::{Motion, Segment};
@@ -203,6 +203,18 @@ impl<'a, const D: usize> SceneBody<'a, D> {
             all
         };
         (self.mesh.rows, self.mesh.nodal_rows) = (rows(|pair| &pair.rows), rows(|pair| &pair.nodal));
+    }
+
+    /// Put the contact rows and loads of the body into the dofs of a frame.
+    pub fn set_frame(&mut self, frame: Frame<D>, pairs: &mut [ContactPair]) {
+        if frame == self.mesh.held.frame {
+            return;
+        }
+        self.mesh.held.frame = frame;
+        let held = &self.mesh.held;
+        self.segments.iter().for_each(|segment| pairs[segment.pair].hold(segment.side, &held.frame, &held.prescribed));
+        self.collect_rows(pairs);
+        self.dof_load = self.mesh.load_on_dofs();
     }
 
     /// Return the motions that supports leave, as traces on the contact rows and works of the loads.

@@ -5,7 +5,7 @@ use super::groups::{FieldValues, Line, earlier, not_on_body, of_body, point, wit
 use crate::error::{Error, Located, Place, Result, shown};
 use crate::exchange::Plain;
 use crate::expression::Field;
-use crate::fem::{Facets, Frame, NodalBlock, NodalForces, Space, cross, length, minus, place, surface};
+use crate::fem::{Facets, Frame, NodalBlock, NodalForces, Space, completed, cross, length, minus, place, surface};
 use crate::linalg::{dot, pad};
 use crate::mesh::{Group, Mesh};
 use crate::problem::{BodySpec, LoadKind, SpringSpec};
@@ -218,20 +218,9 @@ impl<const D: usize> Constraints<D> {
         }
         let turned = basis.iter().any(|(axis, _)| !axis.contains(&1.0));
         if turned {
-            let mut axes: Vec<[f64; D]> = basis.iter().map(|(axis, _)| *axis).collect();
-            for c in 0..D {
-                let rest = axes.iter().fold(axis_vector(c), |rest: [f64; D], axis| {
-                    let share = dot(&rest, axis);
-                    std::array::from_fn(|i| rest[i] - share * axis[i])
-                });
-                let size = dot(&rest, &rest).sqrt();
-                // Some coordinate axis is always this far from a smaller subspace.
-                if axes.len() < D && size > 0.5 {
-                    axes.push(rest.map(|r| r / size));
-                }
-            }
+            let axes = completed(basis.iter().map(|(axis, _)| *axis).collect());
             let surface = self.rigid.iter().find(|surface| surface.nodes[0] == node);
-            self.frame.turn(node, std::array::from_fn(|i| axes[i]), surface.map_or(&[], |surface| &surface.nodes[1..]));
+            self.frame.turn(node, axes, surface.map_or(&[], |surface| &surface.nodes[1..]));
         }
         for (i, (axis, value)) in basis.iter().enumerate() {
             let component = if turned { i } else { (0..D).find(|&c| axis[c] == 1.0).unwrap_or(i) };

@@ -7,7 +7,7 @@
 //! with D x D blocks. Nodes without a row have u_i = v_i. There are rows of three kinds.
 //!
 //! - A support along an inclined direction turns the axes of its nodes, so that it prescribes one component there: u_i
-//!   = Q' v_i.
+//!   = Q' v_i. So does a contact, where unknowns are eliminated, so that its rows have one component there.
 //! - A rigid surface ties its nodes to one of them, the master: u_i = u_A.
 //! - The nodes of a rigid surface that turns move by u_i = u_A + theta x (x_i - x_A). The rotation has the dofs of a
 //!   second node, the pole: v_P = L theta, with the distance L of the pole from the master. So v is a displacement like
@@ -27,6 +27,23 @@ use std::collections::BTreeMap;
 
 /// A row of blocks: for each node of the row its matrix.
 pub type Row<const D: usize> = Vec<(u32, SMatrix<f64, D, D>)>;
+
+/// Return orthonormal axes of which the first ones are given.
+pub fn completed<const D: usize>(mut axes: Vec<[f64; D]>) -> [[f64; D]; D] {
+    for c in 0..D {
+        let mut rest: [f64; D] = std::array::from_fn(|i| f64::from(u8::from(i == c)));
+        for axis in &axes {
+            let along = dot(&rest, axis);
+            (0..D).for_each(|i| rest[i] -= along * axis[i]);
+        }
+        let size = dot(&rest, &rest).sqrt();
+        // some coordinate axis is always this far from a smaller subspace
+        if axes.len() < D && size > 0.5 {
+            axes.push(rest.map(|r| r / size));
+        }
+    }
+    std::array::from_fn(|i| axes[i])
+}
 
 /// Constraints of nodes, as rows of u = T v.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]

@@ -27,7 +27,7 @@ pub use assemble::{ElasticBody, NodalBlock, NodalForces, NodeGraph, support};
 pub use elasticity::Elasticity;
 pub use element::EDGES;
 pub use facets::{Facets, area_vector};
-pub use frame::{Frame, place};
+pub use frame::{Frame, completed, place};
 pub use interpolation::Prolongation;
 pub use recovery::{Errors, Recovery};
 pub use rigid::{PointExtent, RigidMotion};

@@ -126,6 +126,16 @@ impl Csr {
         self.range(i).map(|k| (self.col[k] as usize, self.values[k]))
     }
 
+    /// Return the lower triangle of a square matrix as (row, column, value). Zeros are left out, except on the diagonal.
+    pub fn lower_triangle(&self) -> Vec<(usize, usize, f64)> {
+        let mut lower = Vec::with_capacity(self.values.len() / 2 + self.rows());
+        for i in 0..self.rows() {
+            let row = self.row(i).take_while(|&(j, _)| j <= i).filter(|&(j, value)| value != 0.0 || i == j);
+            lower.extend(row.map(|(j, value)| (i, j, value)));
+        }
+        lower
+    }
+
     /// Compute y = A x.
     pub fn multiply(&self, x: &[f64], y: &mut [f64]) {
         debug_assert_eq!(x.len(), self.columns);
@@ -167,9 +177,17 @@ impl Csr {
         rows
     }
 
-    /// Return b diag(K) b' of each row b, for a square K.
-    pub fn quadratic_diagonal(&self, k: &Csr) -> Vec<f64> {
-        (0..self.rows()).map(|q| self.row(q).map(|(i, b)| b * b * k.diagonal(i)).sum()).collect()
+    /// Return b K b' of each row b, with those entries of a square K alone that couple `dimension` dofs of one node.
+    pub fn stiffness_of_nodes(&self, k: &Csr, dimension: usize) -> Vec<f64> {
+        let at = |i: usize, j: usize| k.position(i, j).map_or(0.0, |at| k.values[at]);
+        let of_node = |entries: &[(usize, f64)]| -> f64 {
+            entries.iter().flat_map(|&(i, b)| entries.iter().map(move |&(j, c)| b * c * at(i, j))).sum()
+        };
+        let of_row = |q: usize| {
+            let row: Vec<(usize, f64)> = self.row(q).collect();
+            row.chunk_by(|a, b| a.0 / dimension == b.0 / dimension).map(of_node).sum()
+        };
+        (0..self.rows()).map(of_row).collect()
     }
 
     /// Return the diagonal entry of row i, zero if the pattern does not have it.

@@ -60,8 +60,6 @@ struct Interior {
     interface: InterfaceDofs,
     /// The loads on all dofs of the body, and K until it is eliminated.
     whole: ElasticBody,
-    /// f of all dofs, in the turned axes.
-    load: Vec<f64>,
     /// The factor, once the interior is eliminated.
     schur: Option<RefCell<Schur>>,
     /// Eliminations in this run: none if one of an earlier run serves.
@@ -117,15 +115,12 @@ impl Body {
         unconstrained_modes: &[Vec<f64>],
         interface: InterfaceDofs,
     ) -> Self {
-        let on_interface = |motion: &Vec<f64>| {
-            let turned = interface.turn(motion);
-            interface.dofs.iter().map(|&dof| turned[dof]).collect()
-        };
+        let on_interface = |motion: &Vec<f64>| interface.dofs.iter().map(|&dof| motion[dof]).collect();
         let modes = unconstrained_modes.iter().map(on_interface).collect();
         let dofs = Dofs::new(interface.dofs.len(), Vec::new(), interface.rows.clone(), modes, None);
-        let (load, words) = (interface.turn(&whole.load), interface.in_words());
+        let words = interface.in_words();
         let interior =
-            Interior { session, chosen, dimension, interface, whole, load, schur: None, eliminations: 0, seconds: 0.0 };
+            Interior { session, chosen, dimension, interface, whole, schur: None, eliminations: 0, seconds: 0.0 };
         let make: MakeSolver = Box::new(|stiffness: Rows| Ok(Box::new(Dense::new(stiffness))));
         let (elastic, diagonal) = (ElasticBody::default(), Vec::new());
         let (make, interior) = (Some(make), Some(interior));
@@ -329,9 +324,9 @@ impl Interior {
     /// Factor the interior and return the body on its interface dofs.
     fn eliminate(&mut self) -> Result<ElasticBody> {
         let (began, name) = (Instant::now(), self.chosen.name());
-        let lower = self.interface.lower_triangle(&self.whole.stiffness);
+        let lower = self.whole.stiffness.lower_triangle();
         self.whole.stiffness = Csr::new(0);
-        let (dofs, interface) = (self.load.len(), &self.interface.dofs);
+        let (dofs, interface) = (self.whole.load.len(), &self.interface.dofs);
         let controls = self.chosen.controls_of_mumps(&self.session);
         let mut schur = Schur::analyse(&self.session, &controls, self.dimension, dofs, &lower, interface)?;
         drop(lower);
@@ -352,10 +347,9 @@ impl Interior {
     /// Replace the loads and prescribed values of the whole body. Return whether these are the same as before.
     fn reload(&mut self, load: Vec<f64>, initial: &InitialLoad, prescribed: Vec<(usize, f64)>) -> bool {
         let of = |whole: &ElasticBody| [whole.load.clone(), whole.lifting.clone()];
-        let (before, whole) = (of(&self.whole), &mut self.whole);
-        whole.reload(load, initial, prescribed);
-        self.load = self.interface.turn(&whole.load);
-        before == of(whole)
+        let before = of(&self.whole);
+        self.whole.reload(load, initial, prescribed);
+        before == of(&self.whole)
     }
 
     /// Do some work with the factor.
@@ -366,14 +360,11 @@ impl Interior {
 
     /// Return the body on the interface dofs, with its loads and without K. None of these dofs is prescribed.
     fn loads(&self) -> Result<ElasticBody> {
-        let Self { interface, whole, load, .. } = self;
+        let Self { interface, whole, .. } = self;
+        let ElasticBody { load, lifting: whole_lifting, .. } = whole;
         let at_rest = vec![0.0; interface.dofs.len()];
         self.with_factor(|schur| {
-            let (mut whole_lifting, mut lifting) = (Vec::new(), Vec::new());
-            if !whole.lifting.is_empty() {
-                whole_lifting = interface.turn(&whole.lifting);
-                lifting = schur.condense(&whole_lifting)?;
-            }
+            let lifting = if whole_lifting.is_empty() { Vec::new() } else { schur.condense(whole_lifting)? };
             let reduced = schur.condense(load)?;
             // displacement of the interior under the loads alone, with the interface dofs at rest
             let interior = schur.expand_condensed(load, &at_rest)?;
@@ -382,7 +373,7 @@ impl Interior {
                 load: reduced,
                 lifting,
                 energy_constant: whole.energy_constant - 0.5 * work,
-                strain_constant: whole.strain_constant + work + 2.0 * dot(&whole_lifting, &interior),
+                strain_constant: whole.strain_constant + work + 2.0 * dot(whole_lifting, &interior),
                 ..ElasticBody::default()
             })
         })
@@ -392,7 +383,6 @@ impl Interior {
     fn reduce(&self, load: &[f64]) -> Result<(Vec<f64>, f64)> {
         let mut load = load.to_vec();
         self.whole.prescribed.iter().for_each(|&(dof, _)| load[dof] = 0.0);
-        let load = self.interface.turn(&load);
         self.with_factor(|schur| {
             let force = schur.condense(&load)?;
             let interior = schur.expand_condensed(&load, &vec![0.0; force.len()])?;
@@ -402,8 +392,7 @@ impl Interior {
 
     /// See [`Body::recover`].
     fn recover(&self, u: &[f64]) -> Result<Vec<f64>> {
-        let turned = self.with_factor(|schur| Ok(schur.expand(&self.load, u)?))?;
-        Ok(self.interface.turn_back(&turned))
+        self.with_factor(|schur| Ok(schur.expand(&self.whole.load, u)?))
     }
 
     /// Add the elimination to the counters of the body.

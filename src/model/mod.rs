@@ -106,7 +106,7 @@ pub struct BodySlot {
     pub modulus: f64,
     /// Its size normal to its contact surfaces.
     pub depth: f64,
-    /// b diag(K) b' of each contact row b: the stiffness of the nodes under a point.
+    /// b K b' of each contact row b, without what couples different nodes: the stiffness of the nodes under a point.
     pub row_stiffness: Vec<f64>,
     /// Energy of the initial strains where the body cannot expand, int eps0 : C eps0.
     pub heat: f64,

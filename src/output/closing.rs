@@ -4,7 +4,7 @@ use super::report::{
     BalanceReport, BodyReport, ForceReport, IntervalReport, LISTED, ObstacleReport, PairReport, PairResult, Report,
     RoundReport, StepReport, TensionReport, UnmetReport, busiest,
 };
-use super::{sci, seconds};
+use super::{RunStatus, sci, seconds};
 use std::collections::BTreeSet;
 
 /// Return the orders of the elements of bodies in words, such as `2` or `1 and 2`.
@@ -112,8 +112,8 @@ impl Report {
     /// Return whether the run ended since the loads have no equilibrium.
     pub fn has_no_state(&self) -> bool {
         // of a history the state is that of its last step
-        let status = self.steps.last().map_or(&self.status, |step| &step.status);
-        matches!(status.as_str(), "underconstrained" | "unbounded")
+        let status = self.steps.last().map_or(self.status, |step| step.status);
+        matches!(status, RunStatus::Underconstrained | RunStatus::Unbounded)
     }
 
     /// Return the line with the counters, errors and times.
@@ -151,14 +151,15 @@ impl Report {
 
     /// Return the line on the interval of gamma, if it was asked for.
     fn interval_line(&self) -> Option<String> {
-        let is_solved = matches!(self.status.as_str(), "converged" | "roundoff-limited");
         let words = match &self.gamma_interval {
             Some(IntervalReport { theorem, descent, .. }) => format!(
                 "F1 falls in every step below {}, theorem 3 promises convergence {}, with the last form G in all steps",
                 sci(*descent, 2),
                 theorem.map_or("nowhere".to_owned(), |end| format!("below {}", sci(end, 2)))
             ),
-            None if is_solved => "unknown, as no step was made or the eigenvalues did not settle".to_owned(),
+            None if self.status.is_solved() => {
+                "unknown, as no step was made or the eigenvalues did not settle".to_owned()
+            }
             None => "unknown, as its bounds are those at a solution, and the run found none".to_owned(),
         };
         (self.settings["method"]["interval"] == true).then(|| format!("  interval of gamma: {words}"))

@@ -10,6 +10,7 @@ pub mod folder;
 mod mark;
 pub mod plot;
 pub mod report;
+mod status;
 pub mod tables;
 pub mod terminal;
 pub mod views;
@@ -25,6 +26,7 @@ pub use report::{
     PairEstimate, PairReport, PairResult, ReactionReport, Report, RoundReport, StepReport, TensionReport, UnmetReport,
     busiest,
 };
+pub use status::RunStatus;
 pub use tables::{ContactTable, HistoryWriter, ResultNames, RowFile, StepTable};
 pub use terminal::IterationTable;
 

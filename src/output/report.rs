@@ -1,5 +1,6 @@
 //! The report of a run, which becomes `report.json`, and its closing lines on the terminal.
 
+use super::RunStatus;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::Value;
@@ -22,7 +23,7 @@ pub struct Report {
     /// Status at the end of the run: `converged`, `roundoff-limited`, `stagnated`, `iteration-limit`, `not-finite`,
     /// `out-of-range`, `underconstrained`, `unbounded`, `inner-solver`, `inaccurate`, `interrupted`, `mesh-limit`,
     /// `tolerance-unmet`.
-    pub status: String,
+    pub status: RunStatus,
     /// The status in words, with body and iteration where they matter.
     pub message: String,
     /// Method of the last step: `robin`, `newton-robin`, `newton`.
@@ -430,7 +431,7 @@ pub struct StepReport {
     /// Factors of loads and prescribed displacements, by name.
     pub factors: BTreeMap<String, f64>,
     /// Status at the end of the step, as [`Report::status`](super::Report::status).
-    pub status: String,
+    pub status: RunStatus,
     /// The status in words.
     pub message: String,
     /// Updates of the iterate in this step.

@@ -221,7 +221,7 @@ impl StepTable {
         self.count += 1;
         let mut line = vec![count("step", self.count), number("time", step.time)];
         line.extend(self.factors.iter().map(|name| number(name, step.factors.get(name).copied())));
-        line.push(("status".to_owned(), step.status.clone()));
+        line.push(("status".to_owned(), step.status.to_string()));
         line.extend([count("iterations", step.iterations), number("residual", step.residual)]);
         let pairs = step.pairs.iter().zip(&self.names.pairs);
         line.extend(pairs.flat_map(|(pair, name)| self.names.of_step(pair, name)));

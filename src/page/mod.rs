@@ -8,8 +8,8 @@ pub use surface::Surface;
 use crate::output::closing::DIGITS;
 use crate::output::folder::REPORT;
 use crate::output::{
-    BodyReport, ForceReport, Mark, ObstacleReport, PairReport, PairResult, Plot, ReactionReport, Report, TensionReport,
-    UNSETTLED, busiest, escape, trimmed,
+    BodyReport, ForceReport, Mark, ObstacleReport, PairReport, PairResult, Plot, ReactionReport, Report, RunStatus,
+    TensionReport, UNSETTLED, busiest, escape, trimmed,
 };
 use crate::problem::{Units, label};
 use serde_json::Value;
@@ -159,8 +159,11 @@ impl Page<'_> {
             title = escape(&report.title),
             style = include_str!("style.css"),
             status = report.status,
-            message =
-                if report.status == "converged" { String::new() } else { format!(": {}", escape(&report.message)) },
+            message = if report.status == RunStatus::Converged {
+                String::new()
+            } else {
+                format!(": {}", escape(&report.message))
+            },
             results = self.results(),
             summary = self.summary(),
             warnings = warnings(&report.warnings),

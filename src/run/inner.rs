@@ -140,14 +140,16 @@ impl<'a> SolverFactory<'a> {
     /// Clear the marks of bodies whose solver is another than in the problem before. Bodies that gave their K to one
     /// matrix serve together or not at all.
     fn keep_solvers(&self, is_kept: &mut [bool]) {
-        let Some(Solvers { plan: before, .. }) = &self.before else { return };
+        let Some(Solvers { plan: before, asked }) = &self.before else { return };
         let is_linear_same = self.has_same_steps();
-        for (is_kept, (body, before)) in is_kept.iter_mut().zip(self.plan.bodies.iter().zip(&before.bodies)) {
-            let is_same = (body.preset, body.is_distributed) == (before.preset, before.is_distributed);
-            *is_kept &= is_same && (is_linear_same || body.preset == Preset::Condensed);
+        for (index, is_kept) in is_kept.iter_mut().enumerate().take(before.bodies.len()) {
+            let of = |plan: &Plan| (plan.bodies[index].preset, plan.bodies[index].is_distributed);
+            // the axes of contact nodes depend on that
+            let has_same_dofs = self.eliminates(index) == eliminates(before, asked, index);
+            let is_same = of(&self.plan) == of(before) && has_same_dofs;
+            *is_kept &= is_same && (is_linear_same || self.plan.bodies[index].preset == Preset::Condensed);
         }
-        let factors =
-            matches!(self.asked.whole.get("pc_type"), Some("cholesky" | "lu")) && self.distributed().is_empty();
+        let factors = factors(&self.asked) && self.distributed().is_empty();
         let is_given = match self.plan.linear {
             Linear::Multigrid => true,
             Linear::Direct => !factors,
@@ -247,6 +249,16 @@ impl<'a> SolverFactory<'a> {
     }
 }
 
+/// Return whether the matrix of all bodies would be factored.
+fn factors(asked: &SolverRequest) -> bool {
+    matches!(asked.whole.get("pc_type"), Some("cholesky" | "lu"))
+}
+
+/// Return whether a plan condenses a body or factors the matrix of all bodies.
+fn eliminates(plan: &Plan, asked: &SolverRequest, body: usize) -> bool {
+    plan.bodies[body].preset == Preset::Condensed || (plan.linear == Linear::Direct && factors(asked))
+}
+
 impl Factory for SolverFactory<'_> {
     type SolverPlan = Plan;
 
@@ -292,6 +304,10 @@ impl Factory for SolverFactory<'_> {
             }
             _ => Vec::new(),
         }
+    }
+
+    fn eliminates(&self, body: usize) -> bool {
+        eliminates(&self.plan, &self.asked, body)
     }
 
     fn wants_interpolation(&self, name: &str) -> bool {

@@ -1,7 +1,7 @@
 //! The report and the contact tables of a run, from its outcome.
 
 use super::stages::{All, Built, Clock, Done};
-use super::verdict::{self, message, status_name};
+use super::verdict::{self, message};
 use super::{results, warnings};
 use crate::ddm::{Outcome, Row, Status};
 use crate::discretize::{BodyInfo, Discrete};
@@ -13,7 +13,7 @@ use crate::linalg::axpy;
 use crate::model::{Body, BodyCounts, Model};
 use crate::output::{
     BodyReport, ContactTable, EstimateReport, FieldArray, InnerTimes, IntervalReport, PairEstimate, PairReport, Report,
-    UnstructuredGrid,
+    RunStatus, UnstructuredGrid,
 };
 use crate::petsc::Session;
 use serde::{Deserialize, Serialize};
@@ -59,7 +59,7 @@ pub fn report(session: &Session, done: &Done, recovered: &All, estimate: Option<
 /// Add the status and the results of the iteration.
 fn add_outcome(report: &mut Report, outcome: &Outcome, model: &Model) {
     let last = outcome.rows.last();
-    report.status = status_name(&outcome.status).to_owned();
+    report.status = RunStatus::from(&outcome.status);
     report.message = message(outcome, model);
     report.method = outcome.method.to_owned();
     report.linear_step = outcome.linear_step.clone();

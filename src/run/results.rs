@@ -14,7 +14,7 @@ use crate::model::{Body, BodySlot, Field};
 use crate::output::closing::readable;
 use crate::output::{
     BalanceReport, BodyReport, Extent, ForceReport, LargestStress, ObstacleReport, PairResult, ReactionReport,
-    ResultNames, StepReport, TensionReport, sci,
+    ResultNames, RunStatus, StepReport, TensionReport, sci,
 };
 use crate::problem::history::History;
 use serde::{Deserialize, Serialize};
@@ -246,7 +246,7 @@ pub fn step(
     recovered: &All,
     history: &History,
     number: usize,
-    status: &str,
+    status: RunStatus,
     message: String,
 ) -> StepReport {
     let approaches = approaches(done, recovered);
@@ -256,7 +256,7 @@ pub fn step(
     StepReport {
         time: step.time,
         factors: history.names.iter().cloned().zip(step.factors.iter().copied()).collect(),
-        status: status.to_owned(),
+        status,
         message,
         iterations: done.outcome.iterations,
         residual: done.outcome.rows.last().map(|row| row.residual).filter(|residual| residual.is_finite()),

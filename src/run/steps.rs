@@ -7,11 +7,12 @@ use super::phases::next_step;
 use super::recorder::{self, Recorder};
 use super::results;
 use super::stages::{All, Clock, Done, Prepared};
-use super::verdict::{message, status_name};
+use super::verdict::message;
 use super::warnings;
 use crate::ddm::{InitialGuess, Observer, Outcome, Row, Solution, Status};
 use crate::error::Result;
 use crate::interrupt::Interrupt;
+use crate::output::RunStatus;
 use crate::problem::history::History;
 use std::rc::Rc;
 
@@ -123,7 +124,7 @@ impl<'a> Steps<'a> {
     /// Add the report of a step that has ended. Return the displacements of the bodies. Collective.
     fn report(&self, done: &mut Done) -> Rc<All> {
         let recovered = results::recover(done);
-        let (status, message) = (status_name(&done.outcome.status), message(&done.outcome, done.model()));
+        let (status, message) = (RunStatus::from(&done.outcome.status), message(&done.outcome, done.model()));
         let step = results::step(done, &recovered, &self.history, self.step - 1, status, message);
         done.steps.push(step);
         recovered

@@ -8,30 +8,31 @@ use crate::ddm::{Outcome, Status};
 use crate::error::Kind;
 use crate::model::{Mechanism, Model, NamedMotion};
 use crate::output::closing::readable;
-use crate::output::{StepReport, sci};
+use crate::output::{RunStatus, StepReport, sci};
 use crate::problem::ContactSpec;
 
-/// Return the name of a status in `report.json`.
-pub fn status_name(status: &Status) -> &'static str {
-    match status {
-        Status::Converged => "converged",
-        Status::RoundoffLimited => "roundoff-limited",
-        Status::Stagnated => "stagnated",
-        Status::IterationLimit => "iteration-limit",
-        Status::NotFinite { .. } => "not-finite",
-        Status::OutOfRange { .. } => "out-of-range",
-        Status::Underconstrained(_) | Status::Mechanism(_) => "underconstrained",
-        Status::Unbounded { .. } => "unbounded",
-        Status::InnerSolver { .. } => "inner-solver",
-        Status::Unbalanced(_) | Status::NoDigits(_) => "inaccurate",
-        Status::Interrupted { .. } => "interrupted",
+impl From<&Status> for RunStatus {
+    fn from(status: &Status) -> Self {
+        match status {
+            Status::Converged => Self::Converged,
+            Status::RoundoffLimited => Self::RoundoffLimited,
+            Status::Stagnated => Self::Stagnated,
+            Status::IterationLimit => Self::IterationLimit,
+            Status::NotFinite { .. } => Self::NotFinite,
+            Status::OutOfRange { .. } => Self::OutOfRange,
+            Status::Underconstrained(_) | Status::Mechanism(_) => Self::Underconstrained,
+            Status::Unbounded { .. } => Self::Unbounded,
+            Status::InnerSolver { .. } => Self::InnerSolver,
+            Status::Unbalanced(_) | Status::NoDigits(_) => Self::Inaccurate,
+            Status::Interrupted { .. } => Self::Interrupted,
+        }
     }
 }
 
 /// Return the exit code of a run.
 pub fn exit_code(done: &Done) -> i32 {
     match done.outcome.status {
-        Status::Converged | Status::RoundoffLimited if done.steps.iter().all(is_solved) => 0,
+        Status::Converged | Status::RoundoffLimited if done.steps.iter().all(|step| step.status.is_solved()) => 0,
         Status::Interrupted { asked } => recorder::signal(asked).map_or(1, |signal| Kind::Stopped(signal).exit_code()),
         _ => 1,
     }
@@ -182,32 +183,22 @@ fn measure(outcome: &Outcome) -> String {
     format!("{name} {}", sci(residual(outcome), 1))
 }
 
-/// Whether a load step has found its solution.
-pub fn is_solved(step: &StepReport) -> bool {
-    [Status::Converged, Status::RoundoffLimited].iter().any(|status| step.status == status_name(status))
-}
-
-/// Statuses of load steps without a solution, from those whose last iterate is nearest to one on; others are worse.
-const UNSOLVED: [&str; 4] = ["inaccurate", "stagnated", "iteration-limit", "interrupted"];
-
 /// Return status and message of the worst load step before the last one, if it found no solution and is worse than the
 /// last one.
-pub fn worst_step(steps: &[StepReport]) -> Option<(String, String)> {
-    let badness = |step: &StepReport| match UNSOLVED.iter().position(|status| *status == step.status) {
-        _ if is_solved(step) => 0,
-        position => position.unwrap_or(UNSOLVED.len()) + 1,
-    };
+pub fn worst_step(steps: &[StepReport]) -> Option<(RunStatus, String)> {
+    // without a finite or held iterate, all are alike
+    let badness = |step: &StepReport| Some(step.status.min(RunStatus::NotFinite)).filter(|status| !status.is_solved());
     let (last, before) = steps.split_last()?;
     let worst = before.iter().map(badness).max().filter(|worst| *worst > badness(last))?;
     let number = before.iter().position(|step| badness(step) == worst)?;
-    let unsolved = steps.iter().filter(|step| !is_solved(step)).count();
+    let unsolved = steps.iter().filter(|step| !step.status.is_solved()).count();
     let message = format!(
         "{unsolved} of {} load steps found no solution; load step {}: {}",
         steps.len(),
         number + 1,
         before[number].message
     );
-    Some((before[number].status.clone(), message))
+    Some((before[number].status, message))
 }
 
 /// Return warnings of the load steps before the last one that found no solution, and of later ones that keep what they
@@ -215,7 +206,7 @@ pub fn worst_step(steps: &[StepReport]) -> Option<(String, String)> {
 pub fn step_warnings(done: &Done) -> Vec<String> {
     let (steps, history) = (&done.steps, &done.built.scene.method.steps);
     let before = steps.iter().take(steps.len().saturating_sub(1)).enumerate();
-    let unsolved = before.filter(|(_, step)| !is_solved(step));
+    let unsolved = before.filter(|(_, step)| !step.status.is_solved());
     let warning = |(i, step): (usize, &StepReport)| {
         let factors: Vec<String> = step.factors.iter().map(|(name, factor)| format!("{name} {factor}")).collect();
         // a step that keeps an offset itself has not found it

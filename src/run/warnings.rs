@@ -4,7 +4,7 @@
 use super::in_words;
 use super::results;
 use super::stages::Done;
-use super::verdict::{is_solved, without_shear};
+use super::verdict::without_shear;
 use crate::contact::{Chords, Coverage, Measure};
 use crate::discretize::Discrete;
 use crate::estimate::{Cause, Estimate, softness};
@@ -389,7 +389,7 @@ fn largest(done: &Done, i: usize, of: fn(&PairResult) -> Option<[f64; 2]>) -> Op
         let is_solved = done.outcome.status.is_solved();
         return is_solved.then(|| results::pair(done, i, None)).and_then(|pair| found(&pair, None));
     }
-    let solved = done.steps.iter().enumerate().filter(|(_, step)| is_solved(step));
+    let solved = done.steps.iter().enumerate().filter(|(_, step)| step.status.is_solved());
     let all = solved.filter_map(|(number, step)| found(&step.pairs[i], Some(number + 1)));
     all.max_by(|a, b| a.most.total_cmp(&b.most))
 }

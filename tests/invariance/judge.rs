@@ -188,7 +188,7 @@ fn answer<const D: usize>(solution: &Solution, change: &Change, factors: &Factor
     };
     let loads = report.bodies.iter().map(|body| &body.balance.loads);
     Answer {
-        status: report.status.clone(),
+        status: report.status.to_string(),
         iterations: report.iterations,
         size,
         loads: loads.map(|loads| change.moment_back(loads.force, loads.moment, force)).collect(),

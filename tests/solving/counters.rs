@@ -220,6 +220,19 @@ fn a_sweep_makes_what_a_setting_touches() {
     }
 }
 
+/// A factor has the normals of curved surfaces as axes of their nodes, and multigrid has not. Bodies do not serve both.
+#[test]
+fn a_sweep_makes_bodies_with_other_axes_anew() {
+    let path = case("rings").display().to_string();
+    let linear = ["--set", "body.0.order=1", "--set", "body.1.order=1", "--over", "solver=mumps,gamg,mumps"];
+    let run = winkler_on(1, &[&["sweep", &path, "-o", "out", "--json"][..], &linear].concat());
+    assert_eq!(run.code, 0, "{}", run.said());
+    let reports: Vec<serde_json::Value> = serde_json::from_str(&run.stdout).expect("a list of reports");
+    assert!(reports.iter().map(|report| made(report)[0]).eq([2, 2, 2]));
+    let peaks: Vec<f64> = reports.iter().filter_map(|report| report["pairs"][0]["peak_pressure"].as_f64()).collect();
+    assert!(peaks.len() == 3 && peaks.iter().all(|peak| (peak / peaks[0] - 1.0).abs() < 1e-7), "{peaks:?}");
+}
+
 /// The second of two values, which have commas inside brackets and quotes only.
 fn second(values: &str) -> &str {
     let mut depth = 0;

@@ -119,7 +119,7 @@ fn attempt(session: &Session, path: &Path, recipe: &Recipe, residual: f64) -> Re
     let report = report::report(session, &done, &recovered, None, &clock);
     let (model, outcome) = (&done.built.discrete.model, done.outcome);
     Ok(Answer {
-        status: report.status,
+        status: report.status.to_string(),
         message: report.message,
         residual: report.residual.unwrap_or(f64::NAN),
         rounding: report.rounding.unwrap_or(0.0),
