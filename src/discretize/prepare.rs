@@ -11,15 +11,15 @@ use super::pairs::{self, Contact, ContactFacts, Contacts};
 use super::partition::Partition;
 use super::scene_body::{SceneBody, parts};
 use super::verify::Verified;
-use super::{chords, mechanism, obstacle};
+use super::{approach, chords, mechanism, obstacle};
 use crate::contact::pieces::Cut;
 use crate::contact::{self, ContactPair};
 use crate::error::Result;
 use crate::exchange::Plain;
 use crate::fem::Frame;
 use crate::fem::rigid::AtDofs;
-use crate::mesh::BodyCheck;
-use crate::model::{BodyFacts, BodySlot, InterfaceDofs, Mechanism, slenderness};
+use crate::mesh::{BodyCheck, Mesh};
+use crate::model::{BodyFacts, BodySlot, InterfaceDofs, Mechanism, Segment, slenderness};
 use crate::problem::Order;
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
@@ -125,7 +125,7 @@ pub fn prepare<'a, const D: usize, F: Factory>(
         kept.pairs.push(inputs);
     }
     let lack = chords::lack(&bodies, mesh)?;
-    SceneBody::complete(&mut bodies, &pairs, mesh)?;
+    complete(&mut bodies, &pairs, mesh)?;
     let mechanisms = mechanism::fix(&mut bodies, &mut pairs, lack);
     let is_through: Vec<bool> = kept.pairs.iter().map(|inputs| inputs.is_through).collect();
     let rigid = obstacle::all(scene, &mut pairs, &is_through, bodies.len())?;
@@ -144,6 +144,27 @@ pub fn prepare<'a, const D: usize, F: Factory>(
         ReplicatedProblem { bodies: shared, pairs, rigid, contacts, mechanisms, fine, plan, is_kept, searched };
     let (owners, partitions) = (kept.owners.clone(), kept.partitions.clone());
     Ok((shared, WholeProblem { bodies, owners, partitions, keep }))
+}
+
+/// Complete all bodies by their contact rows, their loads and the motions that supports leave.
+///
+/// # Errors
+/// See [`SceneBody::load`].
+fn complete<const D: usize>(bodies: &mut [SceneBody<D>], pairs: &[ContactPair], mesh: &Mesh<D>) -> Result<()> {
+    let count = bodies.len();
+    for (pair, sides) in pairs.iter().enumerate() {
+        for (side, &body) in sides.bodies.iter().enumerate().filter(|(_, body)| **body < count) {
+            bodies[body].segments.push(Segment { pair, side });
+        }
+    }
+    for body in bodies {
+        body.mesh.approach = approach::rows(body, &body.segments, pairs, mesh)?;
+        body.mesh.load = body.load(mesh)?;
+        body.mesh.find_motions();
+        body.dof_load = body.mesh.load_on_dofs();
+        body.collect_rows(pairs);
+    }
+    Ok(())
 }
 
 /// Turn nodes to their contact normals, and make the factory's plan, for which that counts. Turn the nodes of bodies

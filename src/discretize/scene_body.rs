@@ -1,7 +1,6 @@
 //! The bodies of the scene on its mesh: space, elasticity, supports, loads, and the rigid motions that supports leave.
 //! Errors name body and place.
 
-use super::approach;
 use super::body_mesh::BodyMesh;
 use super::groups::{FieldValues, Line, find_group, not_on_body, of_body, point, without_area};
 use super::supports::{Constraints, moment_load, spring_blocks};
@@ -170,27 +169,6 @@ impl<'a, const D: usize> SceneBody<'a, D> {
         (poisson > LOCKING).then(|| {
             format!("body {name}: Poisson's ratio is {poisson}: linear elements are far too stiff there; set order = 2")
         })
-    }
-
-    /// Complete all bodies by their contact rows, their loads and the motions that supports leave.
-    ///
-    /// # Errors
-    /// See [`SceneBody::load`].
-    pub fn complete(all: &mut [Self], pairs: &[ContactPair], mesh: &Mesh<D>) -> Result<()> {
-        let count = all.len();
-        for (pair, sides) in pairs.iter().enumerate() {
-            for (side, &body) in sides.bodies.iter().enumerate().filter(|(_, body)| **body < count) {
-                all[body].segments.push(Segment { pair, side });
-            }
-        }
-        for body in all {
-            body.mesh.approach = approach::rows(body, &body.segments, pairs, mesh)?;
-            body.mesh.load = body.load(mesh)?;
-            body.mesh.find_motions();
-            body.dof_load = body.mesh.load_on_dofs();
-            body.collect_rows(pairs);
-        }
-        Ok(())
     }
 
     /// Collect the contact rows of the body.
