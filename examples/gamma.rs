@@ -1,4 +1,5 @@
-//! A rule for gamma of one's own against the built-in ones: Chebyshev's steps, which wear down all modes of a spectrum in turn.
+//! A rule for gamma of one's own against the built-in ones: Chebyshev's steps, which wear down all modes of a spectrum
+//! in turn.
 //!
 //! ```text
 //! cargo run --release --example gamma
@@ -13,7 +14,8 @@ use winkler::api::{
 /// Steps after which the rule begins anew.
 const CYCLE: usize = 4;
 
-/// 1/gamma runs through the roots of Chebyshev's polynomial from 1 to 2. No eigenvalue of G^-1 F1'' exceeds 2, and few modes are slower than 1.
+/// 1/gamma runs through the roots of Chebyshev's polynomial from 1 to 2. No eigenvalue of G^-1 F1'' exceeds 2, and few
+/// modes are slower than 1.
 struct Chebyshev;
 
 impl GammaRule for Chebyshev {

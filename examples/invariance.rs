@@ -13,9 +13,9 @@ use std::path::Path;
 use std::process::ExitCode;
 use winkler::api::{Result, Session};
 
-/// Solves every case of docs/verification.md on a coarse mesh, and again moved by 1, 10^3 and 10^6 of its sizes, turned, mirrored, with lengths
-/// and stresses times 10^-9 and 10^9. Forces, peak pressure, area, approach and iterations must be the same to 1e-8, or to the digits
-/// that moved coordinates have. Exits with 1 if one differs.
+/// Solves every case of docs/verification.md on a coarse mesh, and again moved by 1, 10^3 and 10^6 of its sizes,
+/// turned, mirrored, with lengths and stresses times 10^-9 and 10^9. Forces, peak pressure, area, approach and
+/// iterations must be the same to 1e-8, or to the digits that moved coordinates have. Exits with 1 if one differs.
 #[derive(Parser)]
 #[command(name = "scripts/invariance")]
 struct Arguments {

@@ -1,5 +1,5 @@
-//! A mesh of arrays and a layer law of one's own, against the closed form: a soft film of thickness h that no pressure squeezes to
-//! nothing, p = k c/(1 - c/h), between two blocks that a pressure P shortens evenly.
+//! A mesh of arrays and a layer law of one's own, against the closed form: a soft film of thickness h that no pressure
+//! squeezes to nothing, p = k c/(1 - c/h), between two blocks that a pressure P shortens evenly.
 //!
 //! ```text
 //! cargo run --release --example law

@@ -1,5 +1,6 @@
-//! Prints what both faces of `meshes/paraboloid/scene.toml` yield under the exact pressures, by cosine series: in 1e-4 cm, one row of
-//! numbers for each x, from -1/128 to 65/128 in steps of 1/256 in both directions. `meshes/paraboloid/depth.txt` has its output.
+//! Prints what both faces of `meshes/paraboloid/scene.toml` yield under the exact pressures, by cosine series: in 1e-4
+//! cm, one row of numbers for each x, from -1/128 to 65/128 in steps of 1/256 in both directions.
+//! `meshes/paraboloid/depth.txt` has its output.
 //!
 //! cargo run --release --example paraboloid > meshes/paraboloid/depth.txt
 

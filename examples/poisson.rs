@@ -13,7 +13,8 @@ use std::process::ExitCode;
 use winkler::error::{Error, Kind, Result};
 use winkler::petsc::{Int, Ksp, Matrix, Rows, Scope, Session};
 
-/// Some rows of the matrix on `n` by `n` inner points, scaled by the squared spacing: 4 in the middle, -1 for neighbours.
+/// Some rows of the matrix on `n` by `n` inner points, scaled by the squared spacing: 4 in the middle, -1 for
+/// neighbours.
 fn laplace(session: &Session, n: usize, own: Range<usize>) -> Result<Matrix> {
     let (mut row_ptr, mut columns, mut values) = (vec![0], Vec::new(), Vec::new());
     for row in own.clone() {

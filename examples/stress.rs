@@ -30,10 +30,11 @@ use winkler::petsc::Session;
 
 /// Runs random scenes by every method and compares the pressures with those of Newton's method.
 ///
-/// Scenes are two or three blocks on each other or a ring of four, in the plane, with linear and power laws. With --wide they are up
-/// to seventeen bodies in the plane, of revolution or in space: blocks, cylinders, spheres, lenses, small bodies, walls of bricks; with
-/// laws of every form in one scene, springs to the ground, own weight, and given starts. With --slender they are leaves, discs, plates, frames and
-/// hoops from 1:5 to 1:200, in the plane, of revolution and in space. A seed stands for other scenes then.
+/// Scenes are two or three blocks on each other or a ring of four, in the plane, with linear and power laws. With
+/// --wide they are up to seventeen bodies in the plane, of revolution or in space: blocks, cylinders, spheres, lenses,
+/// small bodies, walls of bricks; with laws of every form in one scene, springs to the ground, own weight, and given
+/// starts. With --slender they are leaves, discs, plates, frames and hoops from 1:5 to 1:200, in the plane, of
+/// revolution and in space. A seed stands for other scenes then.
 ///
 /// With --mixed they have obstacles, bonds and forces besides. With --saturating the layers saturate.
 ///

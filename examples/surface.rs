@@ -1,7 +1,7 @@
 //! Makes a self-affine rough surface as a file for `[data.NAME]`: `cargo run --release --example surface -- --help`.
 //!
-//! A Gaussian field whose power spectrum is flat up to a roll-off and falls as q^(-2-2H) from there to the shortest wave: sum over
-//! waves of a_q sigma(q) with normal a_q, in both directions a product of matrices.
+//! A Gaussian field whose power spectrum is flat up to a roll-off and falls as q^(-2-2H) from there to the shortest
+//! wave: sum over waves of a_q sigma(q) with normal a_q, in both directions a product of matrices.
 
 use clap::Parser;
 use nalgebra::DMatrix;

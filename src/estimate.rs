@@ -20,7 +20,7 @@ use crate::fem::Errors;
 use crate::linalg::axpy;
 use crate::model::field::residual;
 use crate::model::layer::meeting_slopes;
-use crate::model::{Field, Layer, LinearStep, Model};
+use crate::model::{DisplacementField, Layer, LinearStep, Model};
 use crate::scene::Quantity;
 use held::HoldingSprings;
 pub use pressure::{Cause, Guess, softness};
@@ -100,7 +100,7 @@ pub fn estimate(
     meshes: &Meshes,
     model: &mut Model,
     step: &mut dyn LinearStep,
-    iterate: &Field,
+    iterate: &DisplacementField,
     layer: &Layer,
 ) -> Result<Estimate> {
     in_dimension!(meshes, kept => estimate_in(kept, model, step, iterate, layer))
@@ -110,7 +110,7 @@ fn estimate_in<const D: usize>(
     meshes: &KeptMeshes<D>,
     model: &mut Model,
     step: &mut dyn LinearStep,
-    iterate: &Field,
+    iterate: &DisplacementField,
     layer: &Layer,
 ) -> Result<Estimate> {
     let displacements = displacements(meshes, model, iterate)?;
@@ -137,7 +137,7 @@ fn estimate_in<const D: usize>(
     let whole = bodies.iter().chain(&layers).sum::<f64>().max(nodal);
     let energy = relative_norm(whole, reference, held.energy);
     let pressures = PressureErrors::new(meshes, model, layer, &closing);
-    let solution = force::Solution { iterate, layer, displacements: &displacements, recovered: &recovered };
+    let solution = force::SolvedProblem { iterate, layer, displacements: &displacements, recovered: &recovered };
     let force = force::errors(meshes, model, step, &solution, &pressures.error)?;
     let mut trace = iterate.trace.clone();
     held.add_trace(model, -1.0, &mut trace);
@@ -168,7 +168,7 @@ fn estimate_in<const D: usize>(
 fn displacements<const D: usize>(
     meshes: &KeptMeshes<D>,
     model: &Model,
-    iterate: &Field,
+    iterate: &DisplacementField,
 ) -> Result<Vec<Option<Vec<f64>>>> {
     let mut all = Vec::new();
     for (index, (state, rigid)) in iterate.displacements.iter().zip(&iterate.rigid).enumerate() {
@@ -184,7 +184,7 @@ fn displacements<const D: usize>(
 }
 
 /// Return by how much an obstacle or an offset closes the points of a pair, n.
-fn rigid_closing(model: &Model, iterate: &Field, index: usize) -> Vec<f64> {
+fn rigid_closing(model: &Model, iterate: &DisplacementField, index: usize) -> Vec<f64> {
     let (pair, mut closing) = (&model.pairs[index], model.rigid_closing(index, &iterate.rigid));
     closing.iter_mut().for_each(|closing| *closing += pair.offset);
     if model.bodies[pair.bodies[1]].is_rigid {
@@ -196,7 +196,7 @@ fn rigid_closing(model: &Model, iterate: &Field, index: usize) -> Vec<f64> {
 /// The errors of nodal values: the response of bodies and layers to what the elements cannot represent.
 struct NodalErrors {
     /// Error of the displacements.
-    field: Field,
+    field: DisplacementField,
     /// Error of the compression at each contact point, n.
     closing: Vec<f64>,
     /// Squared energy norm of the error.

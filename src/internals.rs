@@ -30,7 +30,7 @@ pub mod mesh {
 
 pub mod model {
     //! The discrete problem.
-    pub use crate::model::{Field, Model, field};
+    pub use crate::model::{DisplacementField, Model, field};
 }
 
 pub mod parallel {

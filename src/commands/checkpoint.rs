@@ -10,7 +10,7 @@ use crate::ddm::{InitialGuess, Solution, Status};
 use crate::error::{Error, Kind, Result};
 use crate::exchange::{Exchange, broadcast};
 use crate::file::digest;
-use crate::model::Field;
+use crate::model::DisplacementField;
 use crate::output::{RoundReport, StepReport, UnmetReport, write_whole};
 use crate::problem::mesh::AdaptedMesh;
 use crate::run::stages::{Begin, Built, Done};
@@ -126,7 +126,7 @@ impl Checkpoint {
             return Err(Error::new(Kind::Scene, message).help(help));
         }
         let Self { head, trace, compression, largest, .. } = self;
-        let solution = Solution { field: Field { trace, ..Field::default() }, compression };
+        let solution = Solution { field: DisplacementField { trace, ..DisplacementField::default() }, compression };
         Ok(Begin { start: Some(InitialGuess::Known(Box::new(solution))), steps: head.steps, largest })
     }
 }

@@ -273,7 +273,7 @@ pub(super) fn pressure_roundoff(model: &Model, trace: &[f64], layer: &Layer, ans
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::Field;
+    use crate::model::DisplacementField;
     use crate::model::sample::{AREA, two_pairs};
 
     fn close(x: f64, y: f64) {
@@ -281,7 +281,12 @@ mod tests {
     }
 
     fn step(trace: Vec<f64>, energy: f64, error: f64) -> LinearSolution {
-        LinearSolution { field: Field { trace, ..Field::default() }, energy, error, is_exact: error == 0.0 }
+        LinearSolution {
+            field: DisplacementField { trace, ..DisplacementField::default() },
+            energy,
+            error,
+            is_exact: error == 0.0,
+        }
     }
 
     fn state<'a>(compression: &'a [f64], pressure: &'a [f64], rho: &'a [f64]) -> Equilibrium<'a> {

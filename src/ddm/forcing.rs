@@ -4,7 +4,7 @@
 use super::bound::{Scale, contact_energy, surface_energy};
 use crate::error::Result;
 use crate::model::Model;
-use crate::model::field::Field;
+use crate::model::field::DisplacementField;
 use crate::model::layer::{Layer, surface_slopes};
 use crate::model::linear::{LinearStep, Solved, System, Trial};
 use crate::model::motions::Motions;
@@ -90,7 +90,7 @@ pub fn respond(
     layer: &Layer,
     loads: &[Vec<f64>],
     share: f64,
-) -> Result<Solved<(Field, f64)>> {
+) -> Result<Solved<(DisplacementField, f64)>> {
     let (mut residual, mut work) = (Vec::new(), [0.0]);
     for (slot, load) in model.bodies.iter_mut().zip(loads) {
         let count = if slot.is_rigid { slot.local.as_ref().map_or(0, |_| slot.free) } else { 0 };

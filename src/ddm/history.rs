@@ -5,7 +5,7 @@ use super::stop::{Status, relative_increment};
 use crate::exchange::asks;
 use crate::linalg::axpy;
 use crate::model::body::Energy;
-use crate::model::field::Field;
+use crate::model::field::DisplacementField;
 use crate::model::layer::Layer;
 use crate::model::motions;
 use crate::model::{BodyCounts, Model};
@@ -36,7 +36,7 @@ pub struct Outcome {
     /// Sweeps made.
     pub sweeps: usize,
     /// The last iterate.
-    pub iterate: Field,
+    pub iterate: DisplacementField,
     /// The layers at that iterate.
     pub layer: Layer,
     /// History, one row per iterate.
@@ -62,7 +62,7 @@ pub struct Outcome {
 
 impl Outcome {
     /// Return the outcome of a run that has made no step. What a loop does not know is empty, until the run ends.
-    pub(super) fn at_start(status: Status, iterate: Field, layer: Layer) -> Self {
+    pub(super) fn at_start(status: Status, iterate: DisplacementField, layer: Layer) -> Self {
         Self {
             status,
             iterations: 0,
@@ -99,7 +99,7 @@ impl Run<'_> {
 
     /// Complete the row of an iterate u, show it and keep it. `moved` is the step of the traces that led to u (2n),
     /// none for a start. Return the first body with a trace that is not finite.
-    pub fn record(&mut self, u: &Field, moved: Option<&[f64]>, row: Row) -> Option<usize> {
+    pub fn record(&mut self, u: &DisplacementField, moved: Option<&[f64]>, row: Row) -> Option<usize> {
         let mut trace = motions::trace(self.model, &u.rigid);
         axpy(1.0, &u.trace, &mut trace);
         let of = |body: usize| match moved {

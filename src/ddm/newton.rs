@@ -22,7 +22,7 @@ use crate::error::Result;
 use crate::exchange::{self, ASKS, asks};
 use crate::model::Model;
 use crate::model::body::Energy;
-use crate::model::field::{Field, LineEnergy, residual, unbalanced};
+use crate::model::field::{DisplacementField, LineEnergy, residual, unbalanced};
 use crate::model::layer::Layer;
 use crate::model::linear::{LinearSolution, LinearStep, Solved, System, Trial};
 
@@ -49,7 +49,7 @@ const WHOLE_STEP: f64 = 0.2;
 pub(super) fn iterate(
     run: &mut Run,
     linear: &mut dyn LinearStep,
-    u: Field,
+    u: DisplacementField,
     states: Layer,
     is_near: bool,
 ) -> Result<Outcome> {
@@ -88,7 +88,7 @@ struct Newton<'n, 'r> {
     tolerance: f64,
     /// Sweeps that the solver of linear steps had made before this run began.
     foreign: usize,
-    u: Field,
+    u: DisplacementField,
     /// Where the next descent begins, unless F1 is less at the iterate: the start, then the end of the last descent.
     lowest: Position,
     /// Steps of all descents so far.
@@ -104,7 +104,7 @@ struct Newton<'n, 'r> {
 /// An iterate that can be returned to.
 #[derive(Clone, Default)]
 struct Position {
-    u: Field,
+    u: DisplacementField,
     /// The gaps that the rigid parts of u leave, n.
     gap: Vec<f64>,
     f1: f64,

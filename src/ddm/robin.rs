@@ -16,7 +16,7 @@ use crate::error::Result;
 use crate::exchange::{self, ASKS};
 use crate::linalg::DIGIT;
 use crate::model::body::Energy;
-use crate::model::field::{Field, residual, unbalanced};
+use crate::model::field::{DisplacementField, residual, unbalanced};
 use crate::model::layer::Layer;
 use crate::model::linear::{LinearSolution, LinearStep, Solved, System, Trial};
 use crate::model::{INNER_TOLERANCE, Model, closing};
@@ -48,7 +48,7 @@ impl Corrector<'_> {
     fn correct(
         &mut self,
         run: &mut Run,
-        u: &Field,
+        u: &DisplacementField,
         layer: &Layer,
         k: usize,
     ) -> Result<std::result::Result<Sweep, Status>> {
@@ -66,7 +66,7 @@ impl Corrector<'_> {
     fn correct_jointly(
         &mut self,
         run: &mut Run,
-        u: &Field,
+        u: &DisplacementField,
         layer: &Layer,
     ) -> Result<std::result::Result<Sweep, Status>> {
         let springs = resisting(run.model, layer).all;
@@ -91,9 +91,11 @@ impl Corrector<'_> {
 
     /// Move the bodies from the motions of a start to displacements of least energy with its trace (2n). With the
     /// matrix of all bodies these have its closings B u; no iterate's closings depend on another part of a start.
-    pub fn extend(&mut self, model: &mut Model, u: &mut Field, trace: &[f64]) -> Result<Solved<()>> {
+    pub fn extend(&mut self, model: &mut Model, u: &mut DisplacementField, trace: &[f64]) -> Result<Solved<()>> {
         if self.coefficient.is_some() {
-            return Ok(extend(model, trace)?.map(|bent| *u = Field { rigid: sums(&u.rigid, &bent.rigid), ..bent }));
+            return Ok(
+                extend(model, trace)?.map(|bent| *u = DisplacementField { rigid: sums(&u.rigid, &bent.rigid), ..bent })
+            );
         }
         u.retrace(model);
         let springs = stiff_joint_springs(model);
@@ -112,7 +114,7 @@ impl Corrector<'_> {
     fn solve_jointly(
         &mut self,
         model: &mut Model,
-        u: &Field,
+        u: &DisplacementField,
         layer: &Layer,
         springs: &[f64],
         force: &[f64],
@@ -136,7 +138,7 @@ pub(super) fn iterate(
     run: &mut Run,
     rule: &mut dyn GammaRule,
     mut corrector: Corrector,
-    mut u: Field,
+    mut u: DisplacementField,
     wants_interval: bool,
 ) -> Result<Outcome> {
     let mut settling = Settling::default();
@@ -191,7 +193,7 @@ pub(super) fn iterate(
 /// error in the energy norm is r'z/lambda.
 fn record(
     run: &mut Run,
-    u: &Field,
+    u: &DisplacementField,
     layer: &Layer,
     sweep: &Sweep,
     last: Option<&LastStep>,

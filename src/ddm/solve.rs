@@ -11,7 +11,7 @@ use super::stop::Status;
 use super::{newton, robin};
 use crate::error::Result;
 use crate::linalg::{DIGIT, axpy};
-use crate::model::field::{Field, residual};
+use crate::model::field::{DisplacementField, residual};
 use crate::model::layer::{Layer, surface_slopes};
 use crate::model::linear::LinearStep;
 use crate::model::motions::{self, Motions, NamedMotion};
@@ -81,7 +81,7 @@ pub fn solve(
     let end = match found {
         Ok(rigid) => run.iterate(method, start, &rigid, wants_interval)?,
         Err(status) => {
-            let rest = Field::rest(run.model);
+            let rest = DisplacementField::rest(run.model);
             let layer = Layer::at(run.model, &rest.trace);
             Outcome::at_start(status, rest, layer)
         }
@@ -112,7 +112,10 @@ impl Run<'_> {
         };
         let is_near = is_known && known.is_none();
         let has_displacements = known.is_some();
-        let mut u = known.unwrap_or_else(|| Field { rigid: self.motions_of(&amounts), ..Field::rest(self.model) });
+        let mut u = known.unwrap_or_else(|| DisplacementField {
+            rigid: self.motions_of(&amounts),
+            ..DisplacementField::rest(self.model)
+        });
         let fallen = motions::trace(self.model, &u.rigid);
         self.model.close_gap(&fallen);
         match method {
@@ -138,7 +141,7 @@ impl Run<'_> {
 
     /// Whether a load or a prescribed displacement acts on a body. Collective.
     fn is_loaded(&self) -> bool {
-        let rest = Field::zero(self.model);
+        let rest = DisplacementField::zero(self.model);
         let (loads, _) = residual(self.model, rest.displacements.clone(), &rest, &vec![0.0; self.model.points()]);
         let mut loaded = [loads.iter().flatten().filter(|load| **load != 0.0).count() as f64];
         self.model.exchange.sum(&mut loaded);
@@ -222,7 +225,7 @@ pub enum InitialGuess {
 #[derive(Debug, Clone, Default)]
 pub struct Solution {
     /// Displacements. Without states of bodies, only traces are known.
-    pub field: Field,
+    pub field: DisplacementField,
     /// Compressions of the layers' states, n.
     pub compression: Vec<f64>,
 }

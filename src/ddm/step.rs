@@ -172,9 +172,9 @@ const AHEAD: f64 = 100.0;
 ///
 /// They are the remedy for slow convergence. Where slender bodies peel off each other, the contact moves by about one
 /// point a step, however Newton's method begins. Laws smoothed by an energy per area mu
-/// ([`Law::resolve`](crate::contact::law::Law::resolve)) have no corner, so that many points move at once. In equilibrium with
-/// smoothed laws, the duality gap is at most mu times the area. As mu falls, the states follow the central path of
-/// interior-point methods to the laws themselves.
+/// ([`Law::resolve`](crate::contact::law::Law::resolve)) have no corner, so that many points move at once. In
+/// equilibrium with smoothed laws, the duality gap is at most mu times the area. As mu falls, the states follow the
+/// central path of interior-point methods to the laws themselves.
 ///
 /// mu is measured by the squared distance e^2/rho of states in equilibrium from the laws, which is an energy per area,
 /// too. D, its mean over all points, shows how far Newton's method has come.

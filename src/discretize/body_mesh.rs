@@ -173,7 +173,7 @@ impl<const D: usize> BodyMesh<D> {
         if scale > 0.0 && self.free > 0 {
             let free = Blocks::free(&self.ground_stiffness(&self.motions), scale, TOLERANCE);
             self.free = free.len();
-            self.motions = rigid::completed(&self.motions, &free);
+            self.motions = rigid::basis_from(&self.motions, &free);
         }
     }
 

@@ -18,7 +18,7 @@ use crate::ddm::respond;
 use crate::discretize::meshes::KeptMeshes;
 use crate::error::{Error, Kind, Result};
 use crate::linalg::{axpy, dot};
-use crate::model::{Field, Layer, LinearStep, Model};
+use crate::model::{DisplacementField, Layer, LinearStep, Model};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::PI;
 
@@ -32,8 +32,8 @@ const UNCERTAIN: f64 = 0.4;
 const MOST: usize = 32;
 
 /// The discrete solution with what is recovered from it.
-pub(super) struct Solution<'a, const D: usize> {
-    pub iterate: &'a Field,
+pub(super) struct SolvedProblem<'a, const D: usize> {
+    pub iterate: &'a DisplacementField,
     pub layer: &'a Layer,
     /// Displacements of all nodes of each body, on the rank that owns it.
     pub displacements: &'a [Option<Vec<f64>>],
@@ -49,7 +49,7 @@ pub(super) fn errors<const D: usize>(
     meshes: &KeptMeshes<D>,
     model: &mut Model,
     step: &mut dyn LinearStep,
-    solution: &Solution<D>,
+    solution: &SolvedProblem<D>,
     pressure_error: &[f64],
 ) -> Result<Vec<f64>> {
     let mut errors = Vec::new();
@@ -119,7 +119,7 @@ impl Influence {
         let springs = &layer.springs(model)[range.clone()];
         let mut unfollowed = without_motions(model, pair, springs);
         let forces: Vec<f64> = unfollowed.iter().zip(springs).map(|(rest, spring)| rest * spring).collect();
-        let none = displacements(meshes, model, &Field::zero(model))?;
+        let none = displacements(meshes, model, &DisplacementField::zero(model))?;
         let mut loads: Vec<Vec<f64>> =
             none.iter().map(|u| u.as_ref().map_or(Vec::new(), |u| vec![0.0; u.len()])).collect();
         for (rows, &body) in model.pairs[pair].nodal.iter().zip(&model.pairs[pair].bodies) {
@@ -153,7 +153,7 @@ impl Influence {
     /// the displacements with any pressure. The bodies give way to a pressure that varies within a facet: with their
     /// compliance s the pressure is where the law meets the line c_h - s (p - p_i) through the interpolated pressure
     /// p_i.
-    fn of_facets<const D: usize>(&self, meshes: &KeptMeshes<D>, model: &Model, solution: &Solution<D>) -> Parts {
+    fn of_facets<const D: usize>(&self, meshes: &KeptMeshes<D>, model: &Model, solution: &SolvedProblem<D>) -> Parts {
         let (pair, points) = (&model.pairs[self.pair], meshes.points(self.pair));
         let (pressure, soft) = (&solution.layer.pressure[model.range(self.pair)], softness(model, self.pair));
         let rigid = rigid_closing(model, solution.iterate, self.pair);

@@ -62,8 +62,8 @@ impl HoldingSprings {
         }
     }
 
-    /// Balance the loads at all nodes of the bodies on these motions ([`Balance`]). `loads` is empty for bodies of other
-    /// ranks. Collective.
+    /// Balance the loads at all nodes of the bodies on these motions ([`Balance`]). `loads` is empty for bodies of
+    /// other ranks. Collective.
     ///
     /// The forces that the springs would carry then act on the bodies themselves, as in a solution without springs.
     pub fn balance<const D: usize>(&self, meshes: &KeptMeshes<D>, model: &Model, loads: &mut [Vec<f64>]) {

@@ -301,8 +301,8 @@ impl Between<'_> {
     ///
     /// Let e be the error of displacements. The pressure of the law has the error kappa e, since p_i is wrong together
     /// with c*, or e/(s + 1/kappa) in a facet of which some points are open. The discrete pressure is a sum of values
-    /// with errors of e/s each, so its error is the root of a = `amplified` times e/s, and a is one where all points are
-    /// closed. The mean of both with the least variance has weights in proportion to one over their squares.
+    /// with errors of e/s each, so its error is the root of a = `amplified` times e/s, and a is one where all points
+    /// are closed. The mean of both with the least variance has weights in proportion to one over their squares.
     fn weight_of_law(&self, tangent: &[f64], amplified: f64) -> f64 {
         let stiffness = self.carriers.iter().map(|(q, _)| tangent[*q]).fold(0.0, f64::max) * self.compliance;
         let weight = |stiffness: f64, amplified: f64| amplified / (amplified + stiffness * stiffness);

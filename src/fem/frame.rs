@@ -26,7 +26,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// A row of blocks: for each node of the row its matrix.
-pub type Row<const D: usize> = Vec<(u32, SMatrix<f64, D, D>)>;
+pub type Combination<const D: usize> = Vec<(u32, SMatrix<f64, D, D>)>;
 
 /// Return orthonormal axes of which the first ones are given.
 pub fn completed<const D: usize>(mut axes: Vec<[f64; D]>) -> [[f64; D]; D] {
@@ -51,7 +51,7 @@ pub fn completed<const D: usize>(mut axes: Vec<[f64; D]>) -> [[f64; D]; D] {
 pub struct Frame<const D: usize> {
     /// C: the dofs that move a node. The first entry of a tied node is that of its master, the entry of a turned node
     /// its own.
-    moved: BTreeMap<u32, Row<D>>,
+    moved: BTreeMap<u32, Combination<D>>,
     /// The pole of each rigid surface that turns, and its distance from the master.
     poles: BTreeMap<u32, f64>,
 }
@@ -131,7 +131,7 @@ impl<const D: usize> Frame<D> {
     pub fn on(&self, nodes: &[u32]) -> Self {
         let here = |node: &u32| place(nodes, *node);
         let entry = |(node, matrix): &(u32, SMatrix<f64, D, D>)| Some((here(node)?, *matrix));
-        let row = |(node, row): (&u32, &Row<D>)| Some((here(node)?, row.iter().filter_map(entry).collect()));
+        let row = |(node, row): (&u32, &Combination<D>)| Some((here(node)?, row.iter().filter_map(entry).collect()));
         Self {
             moved: self.moved.iter().filter_map(row).collect(),
             poles: self.poles.iter().filter_map(|(pole, size)| Some((here(pole)?, *size))).collect(),
@@ -148,7 +148,7 @@ impl<const D: usize> Frame<D> {
 
     /// Replace nodal forces f by forces at dofs, T'f.
     pub fn forces(&self, f: &mut [f64]) {
-        let take = |(&node, row): (&u32, &Row<D>)| {
+        let take = |(&node, row): (&u32, &Combination<D>)| {
             let at = D * node as usize;
             let force = SVector::<f64, D>::from_fn(|c, _| std::mem::take(&mut f[at + c]));
             row.iter().map(move |(to, matrix)| (*to, matrix.tr_mul(&force))).collect::<Vec<_>>()

@@ -195,7 +195,7 @@ pub fn combine<const D: usize>(motions: &[RigidMotion<D>], weights: &DVector<f64
 
 /// Return a basis of the span of motions about the same centre that begins with the combinations of these orthonormal
 /// weights. The motions that are farthest from the span so far complete it.
-pub fn completed<const D: usize>(motions: &[RigidMotion<D>], first: &[DVector<f64>]) -> Vec<RigidMotion<D>> {
+pub fn basis_from<const D: usize>(motions: &[RigidMotion<D>], first: &[DVector<f64>]) -> Vec<RigidMotion<D>> {
     let mut basis: Vec<RigidMotion<D>> = first.iter().map(|weights| combine(motions, weights)).collect();
     let mut rest = DMatrix::identity(motions.len(), motions.len());
     first.iter().for_each(|weights| rest -= weights * weights.tr_mul(&rest));

@@ -126,7 +126,8 @@ impl Csr {
         self.range(i).map(|k| (self.col[k] as usize, self.values[k]))
     }
 
-    /// Return the lower triangle of a square matrix as (row, column, value). Zeros are left out, except on the diagonal.
+    /// Return the lower triangle of a square matrix as (row, column, value). Zeros are left out, except on the
+    /// diagonal.
     pub fn lower_triangle(&self) -> Vec<(usize, usize, f64)> {
         let mut lower = Vec::with_capacity(self.values.len() / 2 + self.rows());
         for i in 0..self.rows() {

@@ -5,7 +5,7 @@
 
 use super::Mesh;
 use super::groups::{self, Group, Numbering};
-use super::scan::{DAMAGED, Flaw};
+use super::scan::{DAMAGED, ScanError};
 use super::simplex::{self, ElementType, THINGS};
 use super::split::Middles;
 use crate::error::{Error, Result};
@@ -56,8 +56,9 @@ pub struct MeshBuilder<const D: usize> {
 const ORDERS: &str = "use elements of order 1 or 2, in the plane up to 8: `gmsh -order 2`";
 
 /// Return an element type of Gmsh.
-pub fn kind_of(number: i32) -> std::result::Result<ElementType, Flaw> {
-    ElementType::of(number).ok_or_else(|| Flaw::new(format!("elements of Gmsh's type {number} cannot be used"), ORDERS))
+pub fn kind_of(number: i32) -> std::result::Result<ElementType, ScanError> {
+    ElementType::of(number)
+        .ok_or_else(|| ScanError::new(format!("elements of Gmsh's type {number} cannot be used"), ORDERS))
 }
 
 impl<const D: usize> MeshBuilder<D> {
@@ -67,22 +68,22 @@ impl<const D: usize> MeshBuilder<D> {
     }
 
     /// Add a physical group with its name.
-    pub fn name(&mut self, dimension: usize, tag: i32, name: &str) -> std::result::Result<(), Flaw> {
+    pub fn name(&mut self, dimension: usize, tag: i32, name: &str) -> std::result::Result<(), ScanError> {
         let (thing, lower) = (THINGS[dimension], THINGS[dimension].to_lowercase());
         if name.trim().is_empty() {
             let help = format!("name it: Physical {thing}(\"name\", {tag}) = {{...}};");
-            return Err(Flaw::new(format!("physical {lower} {tag} has an empty name"), help));
+            return Err(ScanError::new(format!("physical {lower} {tag} has an empty name"), help));
         }
         if dimension > D {
             let what = format!("group `{name}` is made of volumes, but the scene has dimension = {D}");
-            return Err(Flaw::new(what, "set `dimension = 3`, or remove the group"));
+            return Err(ScanError::new(what, "set `dimension = 3`, or remove the group"));
         }
         if !self.names.insert(name.to_owned()) {
             let help = "rename one: a name alone must tell which group is meant";
-            return Err(Flaw::new(format!("two physical groups are named `{name}`"), help));
+            return Err(ScanError::new(format!("two physical groups are named `{name}`"), help));
         }
         if self.group_of.contains_key(&(dimension, tag)) {
-            Err(Flaw::new(format!("two names for physical {lower} {tag}"), DAMAGED))
+            Err(ScanError::new(format!("two names for physical {lower} {tag}"), DAMAGED))
         } else {
             self.add_group(dimension, tag, name.to_owned());
             Ok(())
@@ -97,13 +98,13 @@ impl<const D: usize> MeshBuilder<D> {
     }
 
     /// Return the index of a physical group. The sign of its tag is an orientation.
-    pub fn group(&mut self, dimension: usize, tag: i32) -> std::result::Result<usize, Flaw> {
+    pub fn group(&mut self, dimension: usize, tag: i32) -> std::result::Result<usize, ScanError> {
         let tag = i32::try_from(tag.unsigned_abs()).unwrap_or(i32::MAX);
         let (thing, lower) = (THINGS[dimension], THINGS[dimension].to_lowercase());
         match self.group_of.get(&(dimension, tag)) {
             Some(&group) => Ok(group),
             None if self.named_by_number => Ok(self.add_group(dimension, tag, format!("{lower}_{tag}"))),
-            None => Err(Flaw::new(
+            None => Err(ScanError::new(
                 format!("physical {lower} {tag} has no name"),
                 format!("name it: Physical {thing}(\"name\", {tag}) = {{...}};"),
             )),
@@ -116,12 +117,15 @@ impl<const D: usize> MeshBuilder<D> {
     }
 
     /// Add a node.
-    pub fn node(&mut self, tag: u64, x: [f64; 3]) -> std::result::Result<(), Flaw> {
+    pub fn node(&mut self, tag: u64, x: [f64; 3]) -> std::result::Result<(), ScanError> {
         if let Some(bad) = x.iter().find(|x| !x.is_finite()) {
-            return Err(Flaw::new(format!("a coordinate is {bad}"), DAMAGED));
+            return Err(ScanError::new(format!("a coordinate is {bad}"), DAMAGED));
         }
         if self.points.len() >= u32::MAX as usize {
-            return Err(Flaw::new("there are too many nodes: 32-bit numbers count them", "solve a part of the model"));
+            return Err(ScanError::new(
+                "there are too many nodes: 32-bit numbers count them",
+                "solve a part of the model",
+            ));
         }
         self.tags.push(tag);
         self.points.push(x);
@@ -129,11 +133,11 @@ impl<const D: usize> MeshBuilder<D> {
     }
 
     /// Number the nodes, all of which are there.
-    pub fn number_nodes(&mut self) -> std::result::Result<(), Flaw> {
+    pub fn number_nodes(&mut self) -> std::result::Result<(), ScanError> {
         let tags = std::mem::take(&mut self.tags);
         self.numbers = Numbering::new(tags.iter().copied());
         if let Some(tag) = tags.iter().zip(0..).find(|&(tag, number)| !self.numbers.number(*tag, number).1) {
-            return Err(Flaw::new(format!("node tag {} stands twice", tag.0), DAMAGED));
+            return Err(ScanError::new(format!("node tag {} stands twice", tag.0), DAMAGED));
         }
         let [low, high] = crate::linalg::bounds(self.points.iter().copied());
         self.flat = 1e-12 * (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
@@ -141,13 +145,13 @@ impl<const D: usize> MeshBuilder<D> {
     }
 
     /// Check elements of a type before they are added to groups.
-    pub fn check_type(&mut self, kind: ElementType, groups: &[usize]) -> std::result::Result<(), Flaw> {
+    pub fn check_type(&mut self, kind: ElementType, groups: &[usize]) -> std::result::Result<(), ScanError> {
         let Some(&group) = groups.first() else { return Ok(()) };
         let name = &self.groups[group].name;
         if kind.order > Some(Order::highest(D)) {
             let ElementType { shape, nodes, number, .. } = kind;
             let what = format!("group `{name}` has {} elements of {nodes} nodes (Gmsh's type {number})", shape.name);
-            return Err(Flaw::new(what, ORDERS));
+            return Err(ScanError::new(what, ORDERS));
         }
         let Some(order) = kind.order else { return Ok(()) };
         if self.orders[kind.shape.dimension].get_or_insert((order, group)).0 == order {
@@ -164,7 +168,7 @@ impl<const D: usize> MeshBuilder<D> {
         tag: u64,
         nodes: &[u64],
         groups: &[usize],
-    ) -> std::result::Result<(), Flaw> {
+    ) -> std::result::Result<(), ScanError> {
         let Some(&first) = groups.first() else { return Ok(()) };
         let mut own = std::mem::take(&mut self.nodes);
         own.clear();
@@ -172,7 +176,7 @@ impl<const D: usize> MeshBuilder<D> {
             let Some(number) = self.numbers.get(node) else {
                 let name = &self.groups[first].name;
                 let what = format!("element {tag} of group `{name}` uses node {node}, which does not exist");
-                return Err(Flaw::new(what, DAMAGED));
+                return Err(ScanError::new(what, DAMAGED));
             };
             own.push(number);
         }
@@ -192,7 +196,7 @@ impl<const D: usize> MeshBuilder<D> {
                 let size = ["", "length", "area", "volume"][dimension];
                 let part = if kind.is_divided() { "a part of " } else { "" };
                 let what = format!("{part}element {tag} of group `{}` has zero {size}", self.groups[first].name);
-                return Err(Flaw::new(what, "correct the geometry there, or mesh it again"));
+                return Err(ScanError::new(what, "correct the geometry there, or mesh it again"));
             }
         }
         for &group in groups {
@@ -205,14 +209,14 @@ impl<const D: usize> MeshBuilder<D> {
         Ok(())
     }
 
-    fn check_plane(&self, own: &[u32], tags: &[u64], group: usize) -> std::result::Result<(), Flaw> {
+    fn check_plane(&self, own: &[u32], tags: &[u64], group: usize) -> std::result::Result<(), ScanError> {
         let z = |number: u32| self.points[number as usize][2];
         match own.iter().zip(tags).find(|(number, _)| z(**number).abs() > self.flat) {
             Some((&number, tag)) => {
                 let name = &self.groups[group].name;
                 let what =
                     format!("node {tag} of group `{name}` has z = {}, but the scene has dimension = 2", z(number));
-                Err(Flaw::new(what, "draw plane bodies in the plane z = 0, or set `dimension = 3`"))
+                Err(ScanError::new(what, "draw plane bodies in the plane z = 0, or set `dimension = 3`"))
             }
             None => Ok(()),
         }
@@ -229,7 +233,7 @@ impl<const D: usize> MeshBuilder<D> {
         let order = self.orders[D].map(|(order, _)| order);
         let lower = self.orders[..D].iter().flatten().find(|first| Some(first.0) > order);
         if let (Some(_), Some((_, group))) = (order, lower) {
-            let Flaw { what, help } = other_order(&self.groups[*group].name);
+            let ScanError { what, help } = other_order(&self.groups[*group].name);
             return Err(fail(what).help(help));
         }
         if let Some(order) = order.filter(|order| *order > Order::P1) {
@@ -262,7 +266,7 @@ impl<const D: usize> MeshBuilder<D> {
     }
 }
 
-fn other_order(group: &str) -> Flaw {
+fn other_order(group: &str) -> ScanError {
     let what = format!("group `{group}` is of another order than other elements");
-    Flaw::new(what, "save all elements with one order: gmsh -order 1 or 2")
+    ScanError::new(what, "save all elements with one order: gmsh -order 1 or 2")
 }

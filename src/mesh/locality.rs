@@ -5,10 +5,10 @@
 //! the cells. A product with the stiffness matrix then jumps through memory. With cells in the order of Morton's curve
 //! through their centres it does not.
 //!
-//! Points are partitioned by recursive bisection of coordinates. Points of two bodies that lie together in a contact are in the same
-//! part, or in neighbouring parts. Iterations of all linear steps with hypre on 1, 2, 3, 5, 8 ranks: groove3d n = 24 50, 53, 54, 54,
-//! 54; hertz-sphere n = 26, edge = 1, P1 53, 58, 57, 52, 55; flange 110, 109, 109, 113, 107. Partitions by METIS of the graph of the
-//! nodes took as many, within some per cent.
+//! Points are partitioned by recursive bisection of coordinates. Points of two bodies that lie together in a contact
+//! are in the same part, or in neighbouring parts. Iterations of all linear steps with hypre on 1, 2, 3, 5, 8 ranks:
+//! groove3d n = 24 50, 53, 54, 54, 54; hertz-sphere n = 26, edge = 1, P1 53, 58, 57, 52, 55; flange 110, 109, 109, 113,
+//! 107. Partitions by METIS of the graph of the nodes took as many, within some per cent.
 
 use super::{Group, Mesh};
 use crate::linalg::{bounds, pad};

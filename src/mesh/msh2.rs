@@ -5,7 +5,7 @@
 //! without physical groups. An element of several groups stands in the file once for each of them.
 
 use super::builder::{MeshBuilder, kind_of};
-use super::scan::{Flaw, Scanner};
+use super::scan::{ScanError, Scanner};
 use super::simplex::{ElementType, LINE, POINT, TETRAHEDRON, TRIANGLE};
 use super::{Group, Mesh};
 use crate::error::Result;
@@ -119,7 +119,7 @@ fn add<const D: usize>(
     element: &Element,
     group: usize,
     known: &mut HashSet<(usize, Vec<u64>)>,
-) -> std::result::Result<(), Flaw> {
+) -> std::result::Result<(), ScanError> {
     let Element { number, kind, nodes, .. } = element;
     let mut key = nodes.clone();
     key.sort_unstable();

@@ -27,12 +27,12 @@ pub struct Scanner<'a> {
 }
 
 /// What is wrong with an entry of a file, and what to do.
-pub struct Flaw {
+pub struct ScanError {
     pub what: String,
     pub help: String,
 }
 
-impl Flaw {
+impl ScanError {
     /// Make a flaw with its advice.
     pub fn new(what: impl Into<String>, help: impl Into<String>) -> Self {
         Self { what: what.into(), help: help.into() }
@@ -64,8 +64,8 @@ impl<'a> Scanner<'a> {
     }
 
     /// Return a result whose flaw stands here.
-    pub fn place<T>(&self, result: std::result::Result<T, Flaw>) -> Result<T> {
-        result.map_err(|Flaw { what, help }| self.error(what).help(help))
+    pub fn place<T>(&self, result: std::result::Result<T, ScanError>) -> Result<T> {
+        result.map_err(|ScanError { what, help }| self.error(what).help(help))
     }
 
     /// Return an error here with the advice about damaged files.

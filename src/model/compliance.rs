@@ -17,7 +17,7 @@ use super::dofs::pins;
 use super::field::add_forces;
 use super::linear::{Failure, LinearSolution, LinearStep, Solved, System};
 use super::motions::Motions;
-use super::{Body, BodySlot, Field, Model};
+use super::{Body, BodySlot, DisplacementField, Model};
 use crate::error::{Error, Kind, Result};
 use crate::exchange::{Exchange, broadcast};
 use crate::linalg::{axpy, dot};
@@ -48,8 +48,8 @@ pub struct ComplianceStep {
 }
 
 impl ComplianceStep {
-    /// Make the compliance of the bodies of a model, which have their K. The result is `None` where it does not pay: for
-    /// one body, which has as many points as dofs. It is also `None` for bodies on springs to the ground, whose
+    /// Make the compliance of the bodies of a model, which have their K. The result is `None` where it does not pay:
+    /// for one body, which has as many points as dofs. It is also `None` for bodies on springs to the ground, whose
     /// compliance has few digits of the strains if the springs are soft, and where some K is not positive definite
     /// without its pins. Collective.
     ///
@@ -189,13 +189,13 @@ impl LinearStep for ComplianceStep {
         let mut found = ContactState::zero(model, residual);
         let (forces, closing) = (residual.to_vec(), vec![0.0; model.points()]);
         self.correct(model, &ContactResidual { forces, closing, works: works.clone() }, &mut found)?;
-        // F has the flexibility of a whole body in every entry. That is 1e6 times the flexibility of its surface where a
-        // beam is 100 times as long as thick, so that one solve has six digits less than numbers have.
+        // F has the flexibility of a whole body in every entry. That is 1e6 times the flexibility of its surface where
+        // a beam is 100 times as long as thick, so that one solve has six digits less than numbers have.
         let left = found.left(model, springs, residual, &works);
         self.correct(model, &left, &mut found)?;
         let ContactState { v, amounts, .. } = found;
         let own: f64 = v.iter().zip(residual).map(|(v, r)| dot(v, r)).sum();
-        let (field, sums) = Field::of_step(model, v, &Motions::of(model).of_bodies(&amounts), &[own]);
+        let (field, sums) = DisplacementField::of_step(model, v, &Motions::of(model).of_bodies(&amounts), &[own]);
         self.counts.solves += 1;
         self.counts.solve_seconds += began.elapsed().as_secs_f64();
         let energy = sums[0] + amounts.dot(&works);

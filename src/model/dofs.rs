@@ -13,8 +13,8 @@ use std::rc::Rc;
 /// K E = 0 holds for the rigid motions E that supports and springs leave free, but only in exact numbers. Entries of K
 /// and u are rounded, and f - K u has an error of eps |K| |u| however it is summed. A body that falls far onto a soft
 /// layer would lose its strains in that error. So the part E a of every step is taken out of the displacements and
-/// moved into the gap ([`Field::advance`](super::Field::advance)), and a residual r gets the work E'r that loads and
-/// contact forces do on the motions ([`Dofs::balance`]).
+/// moved into the gap ([`DisplacementField::advance`](super::DisplacementField::advance)), and a residual r gets the
+/// work E'r that loads and contact forces do on the motions ([`Dofs::balance`]).
 #[derive(Default)]
 pub struct Dofs {
     /// Number of dofs, or of those that this rank owns.

@@ -9,9 +9,10 @@ use crate::linalg::{axpy, dot};
 /// Displacements v + E a of all bodies, with rigid motions E that supports and springs leave free.
 ///
 /// Steps and directions have all of B (v + E a) in their traces. Iterates have only B v: the closings B E a are in the
-/// gap of the model ([`Field::advance`]), which then has the digits of compressions, however far bodies fall.
+/// gap of the model ([`DisplacementField::advance`]), which then has the digits of compressions, however far bodies
+/// fall.
 #[derive(Debug, Clone, Default)]
-pub struct Field {
+pub struct DisplacementField {
     /// v, the displacements of each local body without their rigid parts; empty for a body of another rank.
     pub displacements: Vec<Vec<f64>>,
     /// a, the amounts of the motions of each body, on all ranks.
@@ -20,27 +21,27 @@ pub struct Field {
     pub trace: Vec<f64>,
 }
 
-impl Field {
+impl DisplacementField {
     /// Return the field of all bodies at rest.
-    pub fn rest(model: &Model) -> Field {
+    pub fn rest(model: &Model) -> DisplacementField {
         Self::of(model, |body| body.dofs().rest())
     }
 
     /// Return the field with the displacements that supports prescribe.
     #[must_use]
-    pub fn supported(mut self, model: &Model) -> Field {
+    pub fn supported(mut self, model: &Model) -> DisplacementField {
         model.locals().for_each(|(index, body)| body.dofs().prescribe(&mut self.displacements[index]));
         self
     }
 
     /// Return the field without displacement of any body.
-    pub fn zero(model: &Model) -> Field {
+    pub fn zero(model: &Model) -> DisplacementField {
         Self::of(model, |body| vec![0.0; body.dofs().count])
     }
 
-    fn of(model: &Model, displacements: impl Fn(&Body) -> Vec<f64>) -> Field {
+    fn of(model: &Model, displacements: impl Fn(&Body) -> Vec<f64>) -> DisplacementField {
         let state = |slot: &BodySlot| slot.local.as_ref().map_or(Vec::new(), &displacements);
-        Field {
+        DisplacementField {
             displacements: model.bodies.iter().map(state).collect(),
             rigid: model.bodies.iter().map(|slot| vec![0.0; slot.free]).collect(),
             trace: vec![0.0; 2 * model.points()],
@@ -50,8 +51,14 @@ impl Field {
     /// Return the step with the displacements u + E a of the local bodies, and the sums over ranks of `more` numbers. u
     /// may have rigid parts; a are the amounts `apart` of the motions of each local body, or empty where all is in u.
     /// One message, so that all ranks have the same numbers although their processors may round differently.
-    pub fn of_step(model: &Model, displacements: Vec<Vec<f64>>, apart: &[Vec<f64>], more: &[f64]) -> (Field, Vec<f64>) {
-        let (mut field, mut fallen) = (Field { displacements, ..Self::zero(model) }, Self::zero(model).rigid);
+    pub fn of_step(
+        model: &Model,
+        displacements: Vec<Vec<f64>>,
+        apart: &[Vec<f64>],
+        more: &[f64],
+    ) -> (DisplacementField, Vec<f64>) {
+        let (mut field, mut fallen) =
+            (DisplacementField { displacements, ..Self::zero(model) }, Self::zero(model).rigid);
         field.trace_here(model);
         for (index, body) in model.locals() {
             field.rigid[index] = body.dofs().amounts(&field.displacements[index]);
@@ -71,7 +78,7 @@ impl Field {
     }
 
     /// Add t `other`.
-    pub fn add(&mut self, t: f64, other: &Field) {
+    pub fn add(&mut self, t: f64, other: &DisplacementField) {
         self.parts_with(other).for_each(|(u, z)| axpy(t, z, u));
     }
 
@@ -84,18 +91,21 @@ impl Field {
     }
 
     /// Multiply by t, then add `other`.
-    pub fn add_to(&mut self, t: f64, other: &Field) {
+    pub fn add_to(&mut self, t: f64, other: &DisplacementField) {
         self.parts_with(other).for_each(|(own, other)| own.iter_mut().zip(other).for_each(|(x, y)| *x = y + t * *x));
     }
 
     /// Return all vectors of this field with those of the `other` one.
-    fn parts_with<'f>(&'f mut self, other: &'f Field) -> impl Iterator<Item = (&'f mut Vec<f64>, &'f Vec<f64>)> {
+    fn parts_with<'f>(
+        &'f mut self,
+        other: &'f DisplacementField,
+    ) -> impl Iterator<Item = (&'f mut Vec<f64>, &'f Vec<f64>)> {
         let displacements = self.displacements.iter_mut().zip(&other.displacements);
         displacements.chain(self.rigid.iter_mut().zip(&other.rigid)).chain([(&mut self.trace, &other.trace)])
     }
 
     /// Add t `step` to an iterate, whose rigid part goes into the gap of the model.
-    pub fn advance(&mut self, model: &mut Model, t: f64, step: &Field) {
+    pub fn advance(&mut self, model: &mut Model, t: f64, step: &DisplacementField) {
         let fall: Vec<Vec<f64>> = step.rigid.iter().map(|amounts| amounts.iter().map(|a| t * a).collect()).collect();
         let falling = motions::trace(model, &fall);
         self.add(t, step);
@@ -134,7 +144,12 @@ pub fn local_dot(x: &[Vec<f64>], y: &[Vec<f64>]) -> f64 {
 
 /// Return the residual r = f - K u - B' `force` (26) of every local body, for forces at the points (n), and the sum of
 /// the energies of u. `products` are K u.
-pub fn residual(model: &Model, products: Vec<Vec<f64>>, u: &Field, force: &[f64]) -> (Vec<Vec<f64>>, Energy) {
+pub fn residual(
+    model: &Model,
+    products: Vec<Vec<f64>>,
+    u: &DisplacementField,
+    force: &[f64],
+) -> (Vec<Vec<f64>>, Energy) {
     let mut sum = Energy::default();
     let of_body = |(index, product): (usize, Vec<f64>)| {
         let (slot, state, rows) = (&model.bodies[index], &u.displacements[index], model.at_rows(index, force));
@@ -188,7 +203,7 @@ pub struct Unbounded;
 impl<'a> LineEnergy<'a> {
     /// Return the line from an iterate with the layer state `layer` and the equilibrium residual `r` along `v`, with
     /// the products `kv` = K v. One message.
-    pub fn new(model: &'a Model, layer: &'a Layer, r: &[Vec<f64>], v: &Field, kv: &[Vec<f64>]) -> Self {
+    pub fn new(model: &'a Model, layer: &'a Layer, r: &[Vec<f64>], v: &DisplacementField, kv: &[Vec<f64>]) -> Self {
         let mut sums = [local_dot(r, &v.displacements), local_dot(kv, &v.displacements)];
         model.exchange.sum(&mut sums);
         let closing = v.closing();

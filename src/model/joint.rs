@@ -11,7 +11,7 @@ use super::dofs::pins;
 use super::field::add_forces;
 use super::linear::{Failure, LinearSolution, LinearStep, Solved, StoppingTest, System, Trial};
 use super::rigid_parts::{ACCURACY, RigidParts, WithoutRigidParts};
-use super::{BodySlot, Distribution, Dofs, Field, Model, closing};
+use super::{BodySlot, DisplacementField, Distribution, Dofs, Model, closing};
 use crate::error::{Error, Kind, Result};
 use crate::exchange::all_gather;
 use crate::linalg::{Csr, countable, dot};
@@ -237,7 +237,7 @@ impl LinearStep for JointStep {
         let energy = local.map(|(part, _)| dot(&x[part.clone()], &r[part])).sum::<f64>();
         let [displacements, apart] = self.displacements(&x, residual);
         let (mut field, sums) =
-            Field::of_step(model, displacements, &apart, &[energy, f64::from(u8::from(failure.is_some()))]);
+            DisplacementField::of_step(model, displacements, &apart, &[energy, f64::from(u8::from(failure.is_some()))]);
         let (mut energy, failures) = (sums[0], sums[1]);
         if failures > 0.0 {
             let elsewhere = || "the matrix of all bodies cannot be factored on another rank".to_owned();
@@ -275,8 +275,13 @@ impl WithoutRigidParts for JointStep {
         closing(trace).collect()
     }
 
-    fn solve_bodies(&mut self, model: &mut Model, force: &[f64], near: Option<Field>) -> Result<Solved<(Field, f64)>> {
-        let mut x = near.unwrap_or_else(|| Field::zero(model));
+    fn solve_bodies(
+        &mut self,
+        model: &mut Model,
+        force: &[f64],
+        near: Option<DisplacementField>,
+    ) -> Result<Solved<(DisplacementField, f64)>> {
+        let mut x = near.unwrap_or_else(|| DisplacementField::zero(model));
         let mut rest = self.multiply(model, &x.displacements);
         rest.iter_mut().flatten().for_each(|r| *r = -*r);
         let held = x.closing().into_iter().zip(self.matrix.springs()).map(|(closing, spring)| closing * spring);
@@ -290,7 +295,7 @@ impl WithoutRigidParts for JointStep {
             Err(failure) => return Ok(Err(failure)),
         };
         let [displacements, apart] = self.displacements(&change, &rest);
-        x.add(1.0, &Field::of_step(model, displacements, &apart, &[]).0);
+        x.add(1.0, &DisplacementField::of_step(model, displacements, &apart, &[]).0);
         let energy = dot(force, &x.closing());
         Ok(Ok((x, last_error.unwrap_or(self.matrix.solver().accuracy() * energy.max(0.0).sqrt()))))
     }

@@ -25,8 +25,8 @@ pub struct Layer {
     pub work: f64,
     /// Number of points with c > 0, and more than the compression that stays without pressure.
     pub closed: usize,
-    /// mu, n: energy per area by which the laws are smoothed ([`Law::resolve`](crate::contact::law::Law::resolve)); empty for the laws themselves. With
-    /// smoothed laws `energy` is zero.
+    /// mu, n: energy per area by which the laws are smoothed ([`Law::resolve`](crate::contact::law::Law::resolve));
+    /// empty for the laws themselves. With smoothed laws `energy` is zero.
     pub smoothing: Vec<f64>,
 }
 

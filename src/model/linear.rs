@@ -5,7 +5,7 @@
 //! sweep (`robin::SweepCg`). A new way is a new file with an implementation of [`LinearStep`].
 
 use super::Model;
-use super::field::Field;
+use super::field::DisplacementField;
 use super::layer::Layer;
 use crate::error::Result;
 use crate::solver::BodyCounts;
@@ -49,7 +49,7 @@ impl Trial<'_> {
 /// A solution of a [`System`].
 pub struct LinearSolution {
     /// x, with its traces.
-    pub field: Field,
+    pub field: DisplacementField,
     /// x'r, the squared energy norm of x.
     pub energy: f64,
     /// Estimated energy norm of the error of x; zero for a direct solver.

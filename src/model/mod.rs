@@ -22,7 +22,7 @@ pub use crate::solver::{BodyCounts, InterfaceDofs};
 pub use body::Body;
 pub use compliance::ComplianceStep;
 pub use dofs::{Distribution, Dofs};
-pub use field::Field;
+pub use field::DisplacementField;
 pub use joint::JointStep;
 pub use layer::Layer;
 pub use linear::LinearStep;

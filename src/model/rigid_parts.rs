@@ -14,7 +14,7 @@
 //! rigid parts in balance with an inexact x_0, and the second one is symmetric, as a preconditioner must be.
 
 use super::Model;
-use super::field::{Field, local_dot};
+use super::field::{DisplacementField, local_dot};
 use super::linear::Solved;
 use super::motions::Motions;
 use crate::error::Result;
@@ -38,8 +38,8 @@ struct PartMotion {
 
 impl PartMotion {
     /// Return the motion alone.
-    fn alone(&self, model: &Model) -> Field {
-        let mut field = Field::zero(model);
+    fn alone(&self, model: &Model) -> DisplacementField {
+        let mut field = DisplacementField::zero(model);
         field.rigid[self.body][self.motion] = 1.0;
         model.put(self.body, &model.bodies[self.body].motions[self.motion].trace, &mut field.trace);
         field
@@ -56,7 +56,12 @@ pub trait WithoutRigidParts {
 
     /// Solve G x = B' `force` for forces at the points, n, starting from `near`. Return x with the estimated energy
     /// norm of its error. Collective.
-    fn solve_bodies(&mut self, model: &mut Model, force: &[f64], near: Option<Field>) -> Result<Solved<(Field, f64)>>;
+    fn solve_bodies(
+        &mut self,
+        model: &mut Model,
+        force: &[f64],
+        near: Option<DisplacementField>,
+    ) -> Result<Solved<(DisplacementField, f64)>>;
 
     /// Return K v for the displacements v of every local body. Collective.
     fn multiply_bodies(&mut self, model: &mut Model, v: &[Vec<f64>]) -> Vec<Vec<f64>>;
@@ -71,7 +76,7 @@ pub struct RigidParts {
     /// -D N at the points, n each.
     pulls: Vec<Vec<f64>>,
     /// (-X, 1) of each motion.
-    columns: Vec<Field>,
+    columns: Vec<DisplacementField>,
     /// Estimated energy norms of the errors of X.
     errors: Vec<f64>,
     /// The factor of S; `None` if nothing resists some motion.
@@ -192,7 +197,7 @@ impl RigidParts {
     }
 
     /// Add the motions by these amounts, with the bodies that follow, to a step.
-    pub fn add_to(&self, amounts: &DVector<f64>, step: &mut Field) {
+    pub fn add_to(&self, amounts: &DVector<f64>, step: &mut DisplacementField) {
         self.columns.iter().zip(amounts.iter()).for_each(|(column, &a)| step.add(a, column));
     }
 

@@ -155,8 +155,8 @@ impl Ksp {
     /// called after [`set_types`](Self::set_types) and before the options are read.
     ///
     /// Types, tolerances, norms, and what a factorisation needs are set for this solver alone, also those of both
-    /// levels of a multigrid ([`set_interpolation`](Self::set_interpolation)). Other options are put into PETSc's table,
-    /// from where all solvers with this prefix read them.
+    /// levels of a multigrid ([`set_interpolation`](Self::set_interpolation)). Other options are put into PETSc's
+    /// table, from where all solvers with this prefix read them.
     ///
     /// ```
     /// use winkler::petsc::{Ksp, Matrix, Session};

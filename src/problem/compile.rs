@@ -1,8 +1,8 @@
 //! The second pass of reading a scene.
 //!
 //! The first pass is serde's: it knows no more than the value that it reads. Places are spans then, expressions are
-//! texts, and files have the names that were typed. This pass walks all settings once, with the [`Names`] that are known
-//! when the whole scene is read: it gives places their texts, compiles expressions, and finds files.
+//! texts, and files have the names that were typed. This pass walks all settings once, with the [`Names`] that are
+//! known when the whole scene is read: it gives places their texts, compiles expressions, and finds files.
 
 use crate::data::Library;
 use crate::error::{Error, Located, Place, Result, Source};

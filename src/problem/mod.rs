@@ -3,8 +3,8 @@
 //! A key of the scene is a field: its type, its default, and its doc comment, whose first paragraph is shown in
 //! refusals and in the JSON schema. serde reads and writes the structs, schemars describes them. Tables whose keys
 //! exclude each other have a struct of keys (`...Keys`) and become an enum. What serde has read is completed once the
-//! whole scene is known ([`Compile`](compile::Compile)). Values that are impossible or contradict each other are refused
-//! beside their struct ([`Check`](check::Check)), for scenes from files and from Rust alike.
+//! whole scene is known ([`Compile`](compile::Compile)). Values that are impossible or contradict each other are
+//! refused beside their struct ([`Check`](check::Check)), for scenes from files and from Rust alike.
 //!
 //! Names of groups keep the place where they were written ([`Located`](crate::error::Located)): the mesh is read later,
 //! and a refusal of a group that it does not have points there.

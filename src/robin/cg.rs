@@ -10,7 +10,7 @@ use super::sweep::{Coefficient, Sweep, Sweeper};
 use crate::error::Result;
 use crate::linalg::{DIGIT, Factor, axpy, dot};
 use crate::model::Model;
-use crate::model::field::{Field, add_forces, local_dot};
+use crate::model::field::{DisplacementField, add_forces, local_dot};
 use crate::model::linear::{Failure, LinearSolution, LinearStep, Solved, StoppingTest, System, Trial};
 use crate::model::motions::Motions;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
@@ -140,14 +140,14 @@ struct Gradients<'a> {
     r: Vec<Vec<f64>>,
     /// Its work on the free motions of all bodies.
     work: DVector<f64>,
-    x: Field,
+    x: DisplacementField,
     lanczos: Lanczos,
     previous: Option<Previous>,
 }
 
 /// The previous iteration.
 struct Previous {
-    direction: Field,
+    direction: DisplacementField,
     /// r'G^-1 r.
     decrement: f64,
     residual: Vec<Vec<f64>>,
@@ -161,7 +161,7 @@ impl<'a> Gradients<'a> {
         let work = motions.work_of(model, residual);
         let y = coarse.solve(&work);
         let lanczos = Lanczos { energy: y.dot(&work), least, ..Lanczos::default() };
-        let (mut x, mut r) = (Field::zero(model), residual.to_vec());
+        let (mut x, mut r) = (DisplacementField::zero(model), residual.to_vec());
         add_motions(model, 1.0, &y, &mut x);
         let push: Vec<f64> = springs.iter().zip(motions.closing(&y)).map(|(spring, s)| -spring * s).collect();
         add_forces(model, &push, &mut r);
@@ -171,7 +171,7 @@ impl<'a> Gradients<'a> {
 
     /// Return the next direction: the deflated correction, conjugate to the previous direction. `change` is z'(r -
     /// r_previous): with this flexible rule, the preconditioner may be an inexact solve.
-    fn direction(&mut self, model: &Model, mut correction: Field, change: f64) -> Field {
+    fn direction(&mut self, model: &Model, mut correction: DisplacementField, change: f64) -> DisplacementField {
         let force: Vec<f64> = self.springs.iter().zip(correction.closing()).map(|(spring, s)| spring * s).collect();
         let y = self.coarse.solve(&Motions::of(model).work(&force));
         add_motions(model, -1.0, &y, &mut correction);
@@ -187,7 +187,7 @@ impl<'a> Gradients<'a> {
     }
 
     /// Go along a direction p to the least energy. Return false if only rounding is left of p; `rz` is r'G^-1 r.
-    fn advance(&mut self, model: &mut Model, p: &Field, rz: f64) -> bool {
+    fn advance(&mut self, model: &mut Model, p: &DisplacementField, rz: f64) -> bool {
         let mut image = model.multiply(&p.displacements);
         let closing = p.closing();
         let spring: Vec<f64> = self.springs.iter().zip(&closing).map(|(w, s)| w * s).collect();
@@ -212,7 +212,7 @@ impl<'a> Gradients<'a> {
 }
 
 /// v += s Z y.
-fn add_motions(model: &Model, s: f64, y: &DVector<f64>, v: &mut Field) {
+fn add_motions(model: &Model, s: f64, y: &DVector<f64>, v: &mut DisplacementField) {
     let motions = Motions::of(model);
     v.rigid.iter_mut().zip(motions.of_bodies(y)).for_each(|(rigid, y)| axpy(s, &y, rigid));
     axpy(s, &motions.trace(model, y), &mut v.trace);

@@ -5,7 +5,7 @@ use super::sweep::Sweeper;
 use crate::contact::law::Law;
 use crate::error::Result;
 use crate::model::Model;
-use crate::model::field::{Field, zero};
+use crate::model::field::{DisplacementField, zero};
 use crate::model::layer::Layer;
 use crate::model::linear::Trial;
 use crate::model::motions::Motions;
@@ -65,7 +65,7 @@ pub fn interval(model: &mut Model, layer: &Layer, excess: f64) -> Result<Option<
 /// displacements that forces on the contact rows cause. Every mode has a part in these forces: multiples of the golden
 /// ratio spread evenly over (0, 1) without a period.
 fn extremes(model: &mut Model, springs: &[f64]) -> Result<Option<(f64, f64)>> {
-    let (points, mut load) = (model.points(), Field::zero(model).displacements);
+    let (points, mut load) = (model.points(), DisplacementField::zero(model).displacements);
     let force = |i: usize| model.area[i % points] * (0.1 + (0.618_033_988_749_895 * (i + 1) as f64).fract());
     let rows: Vec<f64> = (0..2 * points).map(force).collect();
     for (index, body) in model.locals() {

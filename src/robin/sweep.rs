@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::exchange::{self, ASKS, asks};
 use crate::linalg::{Blocks, axpy, dot};
 use crate::model::body::Energy;
-use crate::model::field::{Field, add_forces, residual};
+use crate::model::field::{DisplacementField, add_forces, residual};
 use crate::model::layer::Layer;
 use crate::model::linear::{Failure, Solved};
 use crate::model::motions::{self, NamedMotion, TOLERANCE, combined};
@@ -20,7 +20,7 @@ pub struct Sweep {
     /// r of each body that lives on this rank.
     pub residual: Vec<Vec<f64>>,
     /// z.
-    pub correction: Field,
+    pub correction: DisplacementField,
     /// r'z = r'G^-1 r.
     pub decrement: f64,
     /// u'Ku of the iterate.
@@ -51,7 +51,7 @@ pub struct Sweeper {
 impl Sweeper {
     /// Solve G_s z_s = r_s in every body at `iterate` with its `layer`, with the Robin term that the model carries. The
     /// requests `asked` of this rank go with the message.
-    pub fn sweep(&mut self, model: &mut Model, iterate: &Field, layer: &Layer, asked: u8) -> Result<Sweep> {
+    pub fn sweep(&mut self, model: &mut Model, iterate: &DisplacementField, layer: &Layer, asked: u8) -> Result<Sweep> {
         let products = model.multiply(&iterate.displacements);
         let (residual, energy) = residual(model, products, iterate, &layer.force);
         let sweep = self.solve(model, residual, energy, None, asked)?;
@@ -121,8 +121,12 @@ impl Sweeper {
                 sums[5] += counts.inner_iterations as f64;
             }
         }
-        let (correction, numbers) =
-            Field::of_step(model, corrections, &vec![Vec::new(); bodies], &[&sums[..], &failed, &asks(asked)].concat());
+        let (correction, numbers) = DisplacementField::of_step(
+            model,
+            corrections,
+            &vec![Vec::new(); bodies],
+            &[&sums[..], &failed, &asks(asked)].concat(),
+        );
         let (sums, rest) = numbers.split_at(sums.len());
         let (failed, asked) = rest.split_at(bodies);
         let failed = failed.iter().position(|&failed| failed != 0.0);
@@ -157,8 +161,13 @@ impl WithoutRigidParts for Sweeper {
         rows
     }
 
-    fn solve_bodies(&mut self, model: &mut Model, force: &[f64], _near: Option<Field>) -> Result<Solved<(Field, f64)>> {
-        let mut residual = Field::zero(model).displacements;
+    fn solve_bodies(
+        &mut self,
+        model: &mut Model,
+        force: &[f64],
+        _near: Option<DisplacementField>,
+    ) -> Result<Solved<(DisplacementField, f64)>> {
+        let mut residual = DisplacementField::zero(model).displacements;
         add_forces(model, force, &mut residual);
         let sweep = self.solve(model, residual, Energy::default(), None, 0)?;
         Ok(sweep.failed.map_or(Ok((sweep.correction, 0.0)), Err))
@@ -347,10 +356,10 @@ pub fn stiff_joint_springs(model: &Model) -> Vec<f64> {
 ///
 /// The sweep (41) depends on the iterate through its traces only, so a start is a trace. The extension minimises the
 /// energy of the body among all displacements with that trace, which springs much stiffer than the body impose.
-pub fn extend(model: &mut Model, trace: &[f64]) -> Result<Solved<Field>> {
+pub fn extend(model: &mut Model, trace: &[f64]) -> Result<Solved<DisplacementField>> {
     let springs = stiff_springs(model);
     model.robin(&springs)?;
-    let mut iterate = Field::rest(model);
+    let mut iterate = DisplacementField::rest(model);
     let products = model.multiply(&iterate.displacements);
     let (mut r, energy) = residual(model, products, &iterate, &vec![0.0; model.points()]);
     let pull: Vec<f64> = springs.iter().zip(trace).map(|(spring, u)| spring * u).collect();

@@ -11,7 +11,7 @@ use crate::discretize::{self, Discrete};
 use crate::error::Result;
 use crate::estimate::{self, Estimate};
 use crate::interrupt::Interrupt;
-use crate::model::{ComplianceStep, Field, INNER_TOLERANCE, JointStep, LinearStep};
+use crate::model::{ComplianceStep, DisplacementField, INNER_TOLERANCE, JointStep, LinearStep};
 use crate::output;
 use crate::parallel::collectively;
 use crate::petsc::Session;
@@ -92,7 +92,7 @@ pub fn next_step(done: Done, mut start: Option<InitialGuess>, clock: &mut Clock)
                 || specs.iter().any(|spec| history.locks(step, spec))
                 || history.moves(step, &built.scene.bodies)
             {
-                solution.field = Field::default();
+                solution.field = DisplacementField::default();
             }
         }
         set_up(&session, built, Begin { start, steps, largest }, clock)

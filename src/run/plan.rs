@@ -332,8 +332,8 @@ mod tests {
     #[test]
     fn the_choice_is_near_the_fastest() {
         // dofs, interface dofs and slenderness of each body; CPU seconds of condensed, mumps, hypre
-        type Row = (&'static str, usize, (usize, usize, f64), [f64; 3]);
-        let rows: [Row; 24] = [
+        type Measurement = (&'static str, usize, (usize, usize, f64), [f64; 3]);
+        let rows: [Measurement; 24] = [
             ("obstacle, adapted", 1, (58_185, 1633, 1.0), [4.82, 17.40, 2.11]),
             ("plate, 40 x 20 x 0.5", 1, (35_793, 2952, 27.7), [3.92, 2.81, 20.78]),
             ("plate, n = 0.7", 1, (20_097, 1653, 27.7), [1.23, 1.25, 9.86]),

@@ -10,7 +10,7 @@ use crate::exchange::all_gather;
 use crate::fem::displacement::{self, Strained};
 use crate::fem::{length, minus};
 use crate::linalg::{around, bounds, dot, range as range_of};
-use crate::model::{Body, BodySlot, Field};
+use crate::model::{Body, BodySlot, DisplacementField};
 use crate::output::closing::readable;
 use crate::output::{
     BalanceReport, BodyReport, Extent, ForceReport, LargestStress, ObstacleReport, PairResult, ReactionReport,
@@ -32,7 +32,7 @@ pub fn recover(done: &Done) -> Rc<All> {
 }
 
 /// Return the displacements of a body. Collective.
-fn recover_body(slot: &BodySlot, body: &Body, iterate: &Field, index: usize) -> Result<Recovered> {
+fn recover_body(slot: &BodySlot, body: &Body, iterate: &DisplacementField, index: usize) -> Result<Recovered> {
     let (bent, amounts) = (&iterate.displacements[index], &iterate.rigid[index]);
     let state = body.recover(&body.dofs().join(bent, amounts))?;
     // a motion that springs resist counts as deformation; the amounts are the same on all ranks, so all of them take

@@ -1,8 +1,8 @@
 //! Scene files: from TOML to a checked [`Scene`]. Every refusal names file and line, and says what to do.
 //!
-//! [`load`] parses the file into a `document` and changes it by the options of the command line. The scene is made in two
-//! passes: serde reads it, and [`Compile`] completes it with what is known of the whole scene. What serde refuses is put
-//! into words by `refuse`. The scene, whether it is read or built in Rust, is checked by [`Scene::verify`].
+//! [`load`] parses the file into a `document` and changes it by the options of the command line. The scene is made in
+//! two passes: serde reads it, and [`Compile`] completes it with what is known of the whole scene. What serde refuses
+//! is put into words by `refuse`. The scene, whether it is read or built in Rust, is checked by [`Scene::verify`].
 
 mod document;
 pub mod gone;

@@ -21,8 +21,8 @@ const PRODUCT: f64 = 42.0 / 1e9;
 const FACTORED: f64 = 320.0;
 
 /// Time of multigrid over 1 + s in products with K, from its set-up to the last step of Newton's method, where s is the
-/// slenderness of a body. With it each scene of docs/solvers.md gets a solver that takes at most 1.1 times as long as the
-/// fastest. Multigrid itself took 0.5 to 1.5 times as long, and 0.2 to 0.5 times on slices that cannot bend.
+/// slenderness of a body. With it each scene of docs/solvers.md gets a solver that takes at most 1.1 times as long as
+/// the fastest. Multigrid itself took 0.5 to 1.5 times as long, and 0.2 to 0.5 times on slices that cannot bend.
 const MULTIGRID: f64 = 720.0;
 
 /// Steps of Newton's method in a scene; those measured take 2 to 8, on the average 4.6.
@@ -128,8 +128,8 @@ pub fn of_each(
     ]
 }
 
-/// Return the cost of a factorisation of all bodies as one in each step, with their mean slenderness. The springs of the
-/// contact couple them, so that the points between bodies are in the last front.
+/// Return the cost of a factorisation of all bodies as one in each step, with their mean slenderness. The springs of
+/// the contact couple them, so that the points between bodies are in the last front.
 fn joined(bodies: &[BodyFacts]) -> Cost {
     let dofs: usize = bodies.iter().map(|body| body.dofs).sum();
     let slenderness = bodies.iter().map(|body| body.dofs as f64 * body.slenderness).sum::<f64>() / dofs as f64;

@@ -9,7 +9,7 @@ use winkler::internals::Interrupt;
 use winkler::internals::contact::law::Law;
 use winkler::internals::ddm::Outcome;
 use winkler::internals::model::field::{local_dot, residual};
-use winkler::internals::model::{Field, Model};
+use winkler::internals::model::{DisplacementField, Model};
 use winkler::internals::run;
 use winkler::internals::run::stages::{Begin, Clock};
 use winkler::petsc::Session;
@@ -68,7 +68,7 @@ fn newton(session: &Session, case: &str, more: &[&str], law: Option<&str>, stop:
 }
 
 /// u'Ku.
-fn strain(model: &mut Model, u: &Field) -> f64 {
+fn strain(model: &mut Model, u: &DisplacementField) -> f64 {
     let open = vec![0.0; model.points()];
     let products = model.multiply(&u.displacements);
     residual(model, products, u, &open).1.strain
@@ -76,7 +76,7 @@ fn strain(model: &mut Model, u: &Field) -> f64 {
 
 /// Return the pressures with f - K u - B' omega p = 0 at the points, n. Rows of side a have no node in common, so that each pressure stands alone.
 /// Where supports prescribe a node of side a, the pressure is that of the law.
-fn equilibrium_pressure(model: &mut Model, u: &Field) -> Vec<f64> {
+fn equilibrium_pressure(model: &mut Model, u: &DisplacementField) -> Vec<f64> {
     let open = vec![0.0; model.points()];
     let products = model.multiply(&u.displacements);
     let (forces, _) = residual(model, products, u, &open);
@@ -119,7 +119,7 @@ struct Layers {
 }
 
 impl Layers {
-    fn of(model: &mut Model, u: &Field) -> Self {
+    fn of(model: &mut Model, u: &DisplacementField) -> Self {
         Self { compression: model.compression(&u.trace), pressure: equilibrium_pressure(model, u) }
     }
 

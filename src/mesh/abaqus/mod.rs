@@ -10,7 +10,7 @@ mod model;
 mod read;
 
 use super::builder::{MeshBuilder, MeshProducer, kind_of};
-use super::scan::Flaw;
+use super::scan::ScanError;
 use super::{Mesh, simplex};
 use crate::error::{Error, Result};
 use lines::LineReader;
@@ -19,8 +19,8 @@ use read::Reader;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::path::Path;
 
-/// Read a file for a scene in `D` dimensions. Return the mesh, and what the user should know of it, in sentences without
-/// a full stop.
+/// Read a file for a scene in `D` dimensions. Return the mesh, and what the user should know of it, in sentences
+/// without a full stop.
 ///
 /// # Errors
 /// A line is not one of Abaqus or CalculiX. The file has no cells, or solids of other kinds. A set has members that do
@@ -40,12 +40,15 @@ pub fn read<const D: usize>(path: &Path, bytes: &[u8]) -> Result<(Mesh<D>, Vec<S
         return Err(Error::mesh(path, None, message).help(help));
     }
     let mesh = build(&reader.model, &groups.list);
-    let mesh = mesh.map_err(|Flaw { what, help }| Error::mesh(path, None, what).help(help))?;
+    let mesh = mesh.map_err(|ScanError { what, help }| Error::mesh(path, None, what).help(help))?;
     Ok((mesh.finish(path)?, notes(path, &reader, &groups.left_out)))
 }
 
 /// Give a mesh the nodes, groups and elements. An element of several groups is added to each of them.
-fn build<const D: usize>(model: &AbaqusModel, groups: &[ElementGroup]) -> std::result::Result<MeshBuilder<D>, Flaw> {
+fn build<const D: usize>(
+    model: &AbaqusModel,
+    groups: &[ElementGroup],
+) -> std::result::Result<MeshBuilder<D>, ScanError> {
     let mut mesh = MeshBuilder::new(MeshProducer::Other);
     let tagged = || (1..).zip(groups);
     tagged().try_for_each(|(tag, group)| mesh.name(group.dimension, tag, &group.name))?;

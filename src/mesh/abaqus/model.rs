@@ -210,7 +210,7 @@ pub struct AbaqusType {
 
 /// What the program makes of a type of elements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Role {
+pub enum ElementUse {
     /// Elements of this kind are cells in their own dimension, and facets or edges in a higher one.
     Mesh(AbaqusType),
     /// Elements without a place in the mesh, such as springs.
@@ -273,9 +273,9 @@ impl AbaqusType {
 const FAMILIES: [&str; 3] =
     ["T2D T3D R2D RAX B2 B3 SAX MAX", "CPS CPE CPEG CAX CGAX DC2D DCAX S DS STRI M3D SFM3D R3D", "C3D DC3D SC"];
 
-impl Role {
+impl ElementUse {
     /// Return what the elements of a type are.
-    pub fn of(name: &str) -> Role {
+    pub fn of(name: &str) -> ElementUse {
         let name = name.to_ascii_uppercase();
         let begins =
             |family: &str| name.strip_prefix(family).filter(|rest| rest.starts_with(|c: char| c.is_ascii_digit()));
@@ -283,7 +283,7 @@ impl Role {
             (1..).zip(FAMILIES).flat_map(|(dimension, all)| all.split(' ').map(move |family| (family, dimension)));
         let matching = families.filter_map(|(family, dimension)| Some((family, dimension, begins(family)?)));
         let Some((family, dimension, rest)) = matching.max_by_key(|(family, ..)| family.len()) else {
-            return Role::LeftOut;
+            return ElementUse::LeftOut;
         };
         let digits: String = rest.chars().take_while(char::is_ascii_digit).collect();
         let nodes = match (family, digits.as_str()) {
@@ -295,9 +295,9 @@ impl Role {
         };
         let kinds = |is_quadratic| (2..=8).filter_map(move |corners| AbaqusType::of(dimension, corners, is_quadratic));
         match kinds(false).chain(kinds(true)).find(|kind| kind.nodes() == nodes) {
-            Some(kind) => Role::Mesh(kind),
-            None if dimension == 3 || name.starts_with('C') => Role::Refused,
-            None => Role::LeftOut,
+            Some(kind) => ElementUse::Mesh(kind),
+            None if dimension == 3 || name.starts_with('C') => ElementUse::Refused,
+            None => ElementUse::LeftOut,
         }
     }
 }
@@ -309,10 +309,10 @@ mod tests {
 
     #[test]
     fn names_give_shapes() {
-        let of = |name: &str| match Role::of(name) {
-            Role::Mesh(kind) => (kind.shape.dimension, simplex::ElementType::number(kind.shape, kind.nodes())),
-            Role::LeftOut => (0, 0),
-            Role::Refused => (0, -1),
+        let of = |name: &str| match ElementUse::of(name) {
+            ElementUse::Mesh(kind) => (kind.shape.dimension, simplex::ElementType::number(kind.shape, kind.nodes())),
+            ElementUse::LeftOut => (0, 0),
+            ElementUse::Refused => (0, -1),
         };
         for (names, expected) in [
             ("C3D4 c3d4h DC3D4", (3, 4)),
@@ -339,7 +339,7 @@ mod tests {
     #[test]
     fn middle_nodes_stay_between_their_ends() {
         for name in ["T3D3", "CPS6", "CPS8", "C3D10", "C3D15", "C3D20"] {
-            let Role::Mesh(kind) = Role::of(name) else { panic!("{name}") };
+            let ElementUse::Mesh(kind) = ElementUse::of(name) else { panic!("{name}") };
             let shape = kind.shape;
             let number = |a: usize, b: usize| 10 * (a.min(b) as u64 + 1) + a.max(b) as u64 + 1;
             let mut nodes: Vec<u64> = (1..=shape.corners as u64).collect();

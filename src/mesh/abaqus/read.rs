@@ -5,7 +5,8 @@ use super::lines::{
     InputLine, Keyword, LineReader, SourceLine, TextResult, coordinates, count, generated, reals, spelled,
 };
 use super::model::{
-    AbaqusElement, AbaqusModel, AbaqusNode, AbaqusSurface, AbaqusType, ElementFace, Label, Role, Set, members, normal,
+    AbaqusElement, AbaqusModel, AbaqusNode, AbaqusSurface, AbaqusType, ElementFace, ElementUse, Label, Set, members,
+    normal,
 };
 use crate::error::Result;
 use nalgebra::{Point3, Rotation3, Unit};
@@ -29,7 +30,7 @@ enum DataLines {
 /// Lines of elements of a type.
 struct ElementLines {
     name: Rc<str>,
-    role: Role,
+    role: ElementUse,
     set: Option<String>,
     /// An element whose line does not have all its nodes.
     open: Vec<u64>,
@@ -145,8 +146,8 @@ impl Reader {
             "NODE" => DataLines::Nodes { set: spelling("NSET"), coordinates: coordinates(keyword)? },
             "ELEMENT" => {
                 let name: Rc<str> = keyword.get("TYPE").unwrap_or_default().to_ascii_uppercase().into();
-                let role = Role::of(&name);
-                if role == Role::Refused {
+                let role = ElementUse::of(&name);
+                if role == ElementUse::Refused {
                     return Err(format!(
                         "elements of type `{name}` cannot be used: triangles, quadrangles, tetrahedra, pyramids, prisms and \
                          hexahedra of order 1 or 2 can, of the families CPS, CPE, CAX and C3D"
@@ -281,7 +282,7 @@ impl Reader {
     /// End the data lines of a keyword.
     fn end(&mut self, data: DataLines) -> TextResult<()> {
         match data {
-            DataLines::Elements(ElementLines { role: Role::Mesh(kind), open, .. }) if !open.is_empty() => {
+            DataLines::Elements(ElementLines { role: ElementUse::Mesh(kind), open, .. }) if !open.is_empty() => {
                 check_count(kind, &open)
             }
             _ => Ok(()),
@@ -327,7 +328,7 @@ impl Reader {
     fn element(&mut self, lines: &mut ElementLines, words: &[&str], ends: bool, at: SourceLine) -> TextResult<()> {
         let ElementLines { name, role, set, open, comma } = lines;
         let before = open.len();
-        let kind = if let Role::Mesh(kind) = *role { Some(kind) } else { None };
+        let kind = if let ElementUse::Mesh(kind) = *role { Some(kind) } else { None };
         if kind.is_none() {
             // The number of nodes is unknown, so that the element ends where its line does not go on.
             open.extend(count(words[0]).ok().filter(|_| open.is_empty()));
