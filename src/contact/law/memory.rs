@@ -146,3 +146,46 @@ impl LayerLaw for Memory {
         self.points[point].map_or(0.0, |memory| memory.largest - memory.fall)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::law::numeric::integral;
+
+    /// A law p = (c/1e-4)^2 that was compressed to 2e-4 at the first point, and never at the second.
+    fn crushed(unloading: Unloading) -> Result<Law> {
+        let loading: Rc<dyn LayerLaw> = Rc::new(Power::new(1e-4, 0.5));
+        let mut law = Law { unloading: Some(unloading), ..Law::from(loading) };
+        law.remember(&[2e-4, -1.0])?;
+        Ok(law)
+    }
+
+    #[test]
+    fn energy_and_inverse_belong_to_the_pressure() {
+        let linear = || Rc::new(Power::linear(1e5)) as Rc<dyn LayerLaw>;
+        for unloading in [Unloading::Law(linear()), Unloading::Slopes(vec![[3.0, 5e4], [5.0, 1.5e5]])] {
+            let law = crushed(unloading).expect("a stiff law");
+            // p_m = 4 falls along the slope 1e5, so that 4e-5 of the compression are elastic
+            assert!((law.rest(0) - 1.6e-4).abs() < 1e-18 && law.rest(1) == 0.0);
+            assert!((law.pressure(0, 1.8e-4) - 2.0).abs() < 1e-12 && law.pressure(0, 1.5e-4) == 0.0);
+            assert_eq!((law.pressure(0, 2e-4), law.pressure(0, 3e-4)), (law.pressure(1, 2e-4), law.pressure(1, 3e-4)));
+            for c in [1e-4, 1.7e-4, 2e-4, 2.5e-4] {
+                let pressure = law.pressure(0, c);
+                let sum = integral(&|c| law.pressure(0, c), law.rest(0).min(c), c.min(2e-4));
+                let sum = sum + integral(&|c| law.pressure(0, c), 2e-4, c.max(2e-4));
+                assert!((law.energy(0, c) - sum).abs() < 1e-12 * law.energy(0, 2.5e-4), "{c}");
+                assert!(pressure == 0.0 || (law.compression(0, pressure) / c - 1.0).abs() < 1e-12, "{c}");
+                // on the graph, also where the layer stays compressed without pressure
+                assert!(law.duality_gap(0, c, pressure) < 1e-20, "{c}");
+                let (rho, state) = (3e4, law.resolvent(0, c + pressure / 3e4, 3e4));
+                assert!((state + law.pressure(0, state) / rho - c - pressure / rho).abs() < 1e-15, "{c}");
+            }
+        }
+    }
+
+    #[test]
+    fn soft_unloading_is_refused() {
+        let error = crushed(Unloading::Law(Rc::new(Power::linear(1e4)))).expect_err("2 of 4");
+        assert!(error.to_string().contains("softer"), "{error}");
+    }
+}
