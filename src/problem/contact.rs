@@ -195,6 +195,7 @@ impl ContactSpec {
             layer: LayerSpec::linear(shear.clone()),
             gap: no_gap(),
             tension: None,
+            unload: None,
             shear: None,
             force: None,
             preload: None,
