@@ -1,6 +1,7 @@
 //! `winkler mesh`: make the mesh of a scene, or find it in the cache, and print what is in it.
 
-use super::inputs;
+use super::shapes::SurfaceFacts;
+use super::{inputs, shapes};
 use crate::discretize::{Verified, find_group, verify};
 use crate::error::{Error, Kind, Result};
 use crate::exchange::Serial;
@@ -74,6 +75,10 @@ struct GroupFacts {
     /// Least and largest coordinates.
     low: Vec<f64>,
     high: Vec<f64>,
+    /// Bodies, or groups of cells, that a surface bounds.
+    bounds: Vec<String>,
+    /// Shape of a surface in words; empty if it is not a known one.
+    shape: String,
 }
 
 /// Make the mesh of a scene or find it in the cache, and return the exit code.
@@ -178,12 +183,14 @@ fn bodies<const D: usize>(verified: &Verified<D>) -> Result<Vec<BodyFacts>> {
 }
 
 fn group_facts<const D: usize>(mesh: &Mesh<D>) -> Vec<GroupFacts> {
-    let of_group = |group: &Group| {
+    let of_group = |(group, surface): (&Group, SurfaceFacts)| {
         let points = group.connectivity.iter().map(|&point| mesh.in_scene(mesh.points[point as usize]));
         let [low, high] = bounds(points).map(|corner| corner[..D].to_vec());
-        GroupFacts { name: group.name.to_string(), dimension: group.dimension, simplices: group.len(), low, high }
+        let SurfaceFacts { bodies: bounds, shape } = surface;
+        let (name, dimension, simplices) = (group.name.to_string(), group.dimension, group.len());
+        GroupFacts { name, dimension, simplices, low, high, bounds, shape }
     };
-    mesh.groups.iter().map(of_group).collect()
+    mesh.groups.iter().zip(shapes::of_groups(mesh)).map(of_group).collect()
 }
 
 /// Return the facts as lines for people.
@@ -205,7 +212,10 @@ fn in_lines(facts: &MeshFacts) -> String {
     for group in listed {
         let kind = ["points", "lines", "triangles", "tetrahedra"][group.dimension];
         let (low, high) = (corner(&group.low), corner(&group.high));
-        lines.push(format!("  group {}: {} {kind}, ({low}) to ({high})", group.name, group.simplices));
+        let beside =
+            if group.bounds.is_empty() { String::new() } else { format!(" of {}", group.bounds.join(" and ")) };
+        let shape = if group.shape.is_empty() { String::new() } else { format!(", {}", group.shape) };
+        lines.push(format!("  group {}: {} {kind}{beside}{shape}, ({low}) to ({high})", group.name, group.simplices));
     }
     lines.join("\n")
 }

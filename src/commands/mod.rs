@@ -10,6 +10,7 @@ pub(crate) mod mesh;
 pub(crate) mod new;
 mod plots;
 mod rows;
+mod shapes;
 mod shortfall;
 pub(crate) mod solve;
 pub(crate) mod sweep;

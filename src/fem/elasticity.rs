@@ -141,8 +141,8 @@ impl Elasticity {
         Ok(strain)
     }
 
-    /// Return the stress (xx yy zz xy yz xz) of a strain (xx yy zz, and 2 eps of xy yz xz) in a cell at a point: C (eps
-    /// - alpha T).
+    /// Return the stress (xx yy zz xy yz xz) of a strain (xx yy zz, and 2 eps of xy yz xz) in a cell at a point:
+    /// C (eps - alpha T).
     ///
     /// # Errors
     /// As [`Elasticity::at`] and [`Elasticity::initial_strain`].

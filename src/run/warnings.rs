@@ -214,9 +214,9 @@ const BY_CHORDS: f64 = 0.1;
 /// are.
 ///
 /// The heights h of the surfaces above their facets close the gap, be it drawn as a clearance, as an overlap or as
-/// nothing. A point with the compression c and the pressure p then has the pressure where the law meets the line c + h
-/// + s p, with the compliance s of the bodies to a wave as long as the contact, or as a facet of elements of order two
-/// or more. A contact of Hertz with n facets in its radius changes by about 1/(4 n^2).
+/// nothing. A point with the compression c and the pressure p then has the pressure where the law meets the line
+/// c + h + s p, with the compliance s of the bodies to a wave as long as the contact, or as a facet of elements of order
+/// two or more. A contact of Hertz with n facets in its radius changes by about 1/(4 n^2).
 pub fn by_chords(done: &Done, i: usize) -> Option<String> {
     let (pair, layer, range) = (&done.model().pairs[i], &done.outcome.layer, done.model().range(i));
     let Chords { sagitta, height, wave } =

@@ -1,8 +1,8 @@
 //! The interface dofs of a body that is condensed to its contact.
 //!
-//! Let R be the interface dofs and I the interior ones. Then S = K_RR - K_RI K_II^-1 K_IR is the stiffness and g = f_R
-//! - K_RI K_II^-1 f_I the load of a body with the same contact rows. Its matrix G = S + B_R' diag(weight) B_R is dense
-//! and small.
+//! Let R be the interface dofs and I the interior ones. The stiffness S = K_RR - K_RI K_II^-1 K_IR and the load
+//! g = f_R - K_RI K_II^-1 f_I are those of a body with the same contact rows. Its matrix G = S + B_R' diag(weight) B_R
+//! is dense and small.
 //!
 //! The method sees a body only through its contact rows, so the dofs in these rows are interface dofs. Some more dofs
 //! are added where supports and contact do not constrain the interior well.

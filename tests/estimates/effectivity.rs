@@ -96,7 +96,7 @@ fn estimates_are_of_the_size_of_errors() {
 /// The reference of the scene, by which `bench` measures errors, has an error of 1e-5 in the mean square.
 #[test]
 fn the_reference_of_the_paraboloid_is_its_series() {
-    let scene = load(&Path::new("meshes/paraboloid/scene.toml"), &[]).expect("a scene");
+    let scene = load(Path::new("meshes/paraboloid/scene.toml"), &[]).expect("a scene");
     let gap = |x: f64, y: f64| 4e-3 * (x * x + y * y);
     let boxes =
         Boxes { side: 0.5, height: 0.5, young: 2.1e5, poisson: 0.3, stiffness: 1e6, approach: 3e-4, points: 256 };

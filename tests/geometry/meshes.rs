@@ -546,3 +546,41 @@ fn tetrahedra_are_by_hxt_where_it_is_steady() {
         assert!(calls.iter().all(|call| call.contains(&format!("-nt {number}"))), "{calls:?}");
     }
 }
+
+/// `winkler mesh` says which body a surface bounds, and what shape it has, with its outer normal or on which side its body is.
+#[test]
+fn shapes_of_surfaces() {
+    let folder = tempfile::TempDir::new().expect("a folder");
+    let listed = |script: &str| {
+        let path = folder.path().join("part.geo");
+        std::fs::write(&path, format!("SetFactory(\"OpenCASCADE\");\n{script}\n")).expect("a script");
+        let run = crate::common::winkler(&["mesh", &path.display().to_string()]);
+        assert_eq!(run.code, 0, "{}", run.said());
+        run.stdout
+    };
+    let solids = listed(
+        "Box(1) = {0, 0, 0, 40, 30, 10}; Cylinder(2) = {20, 15, -1, 0, 0, 12, 6}; BooleanDifference(3) = {Volume{1}; Delete;}{Volume{2}; Delete;};
+         Cylinder(4) = {100, 0, 0, 3, 4, 12, 5}; Cone(5) = {150, 0, 0, 0, 0, 10, 8, 4}; Sphere(6) = {200, 0, 0, 7}; Mesh.MeshSizeMax = 2;
+         Physical Volume(\"plate\") = {3}; Physical Volume(\"others\") = {4, 5, 6}; Physical Surface(\"top\") = {3}; Physical Surface(\"hole\") = {7};
+         Physical Surface(\"pin\") = {8}; Physical Surface(\"taper\") = {11}; Physical Surface(\"ball\") = {14};",
+    );
+    for words in [
+        "of plate, plane, normal (0.0000, 0.0000, 1.0000)",
+        "of plate, hollow cylinder of radius 6.0000 about (0.0000, 0.0000, 1.0000) through (20.0000, 15.0000,",
+        "of others, cylinder of radius 5.0000 about (0.2308, 0.3077, 0.9231)",
+        "of others, cone of 21.8014 degrees to its axis (0.0000, 0.0000, 1.0000)",
+        "of others, sphere of radius 7.0000, centre (200.0000, 0.0000, 0.0000)",
+    ] {
+        assert!(solids.contains(words), "{words} in\n{solids}");
+    }
+    let plane = listed(
+        "Rectangle(1) = {0, 0, 0, 4, 3}; Disk(2) = {2, 1.5, 0, 0.7}; BooleanDifference(3) = {Surface{1}; Delete;}{Surface{2}; Delete;};
+         Mesh.MeshSizeMax = 0.2; Physical Surface(\"plate\") = {3}; Physical Curve(\"hole\") = {5}; Physical Curve(\"left\") = {2};",
+    );
+    for words in [
+        "of plate, hollow circle of radius 0.7000, centre (2.0000, 1.5000)",
+        "of plate, straight, normal (-1.0000, 0.0000)",
+    ] {
+        assert!(plane.contains(words), "{words} in\n{plane}");
+    }
+}

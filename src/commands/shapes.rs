@@ -1,0 +1,216 @@
+//! What `winkler mesh` says about the surfaces of a mesh, so that a user finds them: the body that each one bounds, and
+//! its shape, as far as it is plane, a cylinder, a sphere or a cone.
+
+use crate::fem::{cross, length, minus, pad, unit};
+use crate::mesh::faces::{Face, Faces, Simplices};
+use crate::mesh::{Group, Mesh};
+use crate::output::closing::readable;
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use std::collections::BTreeSet;
+
+/// A facet with its outer normal.
+struct OrientedFacet<const D: usize> {
+    /// Mean of its corners.
+    centre: [f64; D],
+    normal: [f64; D],
+    area: f64,
+}
+
+/// The bodies beside a surface, and its shape in words.
+#[derive(Default)]
+pub struct SurfaceFacts {
+    /// Groups of cells that it bounds.
+    pub bodies: Vec<String>,
+    /// The shape; empty if it is not a known one.
+    pub shape: String,
+}
+
+/// Return the facts of each group of a mesh; none for groups that are no surfaces.
+pub fn of_groups<const D: usize>(mesh: &Mesh<D>) -> Vec<SurfaceFacts> {
+    let cells = mesh.groups.iter().filter(|group| group.dimension == D);
+    let bodies: Vec<(&Group, Simplices<D>, Faces<D>)> = cells
+        .map(|group| {
+            let cells = Simplices { nodes: &group.connectivity, stride: group.stride };
+            (group, cells, Faces::new(cells))
+        })
+        .collect();
+    let of_surface = |group: &Group| {
+        let mut names = BTreeSet::new();
+        let mut facets = Vec::new();
+        let points: BTreeSet<u32> = group.connectivity.iter().copied().collect();
+        let points: Vec<[f64; D]> = points.into_iter().map(|point| mesh.points[point as usize]).collect();
+        for facet in group.simplices() {
+            for (body, cells, faces) in &bodies {
+                let beside: Vec<Face<D>> = faces.at(&facet[..D]).collect();
+                names.extend(beside.first().map(|_| body.name.clone()));
+                facets.extend(beside.into_iter().map(|face| OrientedFacet::new(mesh, face, *cells)));
+            }
+        }
+        // between two bodies a surface has two outer sides
+        let shape = if names.len() == 1 { shape(&facets, &points, &mesh.datum) } else { String::new() };
+        SurfaceFacts { bodies: names.into_iter().collect(), shape }
+    };
+    let of_group = |group: &Group| {
+        if group.dimension + 1 == D { of_surface(group) } else { SurfaceFacts::default() }
+    };
+    mesh.groups.iter().map(of_group).collect()
+}
+
+impl<const D: usize> OrientedFacet<D> {
+    fn new(mesh: &Mesh<D>, face: Face<D>, cells: Simplices<D>) -> Self {
+        let corners = face.corners().map(|corner| mesh.points[cells.cell(face.cell())[corner] as usize]);
+        let edge = |k: usize| minus(corners[(k + 1) % D], corners[k]);
+        let (along, next) = (edge(0), edge(1));
+        let normal: [f64; D] = if D == 2 {
+            std::array::from_fn(|c| if c == 0 { along[1] } else { -along[0] })
+        } else {
+            let doubled = cross(pad(along), pad(next));
+            std::array::from_fn(|c| 0.5 * doubled[c])
+        };
+        Self {
+            centre: std::array::from_fn(|c| corners.iter().map(|x| x[c]).sum::<f64>() / D as f64),
+            normal: unit(normal),
+            area: length(normal),
+        }
+    }
+}
+
+/// Share of the size of a surface up to which its points may be beside a shape. Files have six digits or more.
+const ON_SHAPE: f64 = 1e-5;
+
+/// Return the shape of a surface in words, from its facets with outer normals and its points; empty if it is none of
+/// those that are looked for.
+fn shape<const D: usize>(facets: &[OrientedFacet<D>], points: &[[f64; D]], datum: &[f64; D]) -> String {
+    let [low, high] = crate::linalg::bounds(points.iter().map(|&x| pad(x)));
+    let limit = ON_SHAPE * length(minus(high, low));
+    let in_scene = |x: &DVector<f64>| vector(&(0..D).map(|c| x[c] + datum[c]).collect::<Vec<_>>());
+    // a hole has its normals towards the centre or the axis
+    let side = |from: &dyn Fn(&DVector<f64>) -> DVector<f64>| {
+        let outward = |facet: &OrientedFacet<D>| facet.area * from(&column(facet.centre)).dot(&column(facet.normal));
+        if facets.iter().map(outward).sum::<f64>() < 0.0 { "hollow " } else { "" }
+    };
+    let total: f64 = facets.iter().map(|facet| facet.area).sum();
+    let normal: DVector<f64> = facets.iter().map(|facet| facet.area / total * column(facet.normal)).sum();
+    let across = |x: &[f64; D]| (column(*x) - column(points[0])).dot(&normal).abs();
+    if normal.norm() > 0.5 && points.iter().all(|x| across(x) <= limit) {
+        let kind = if D == 2 { "straight" } else { "plane" };
+        return format!("{kind}, normal {}", vector(normal.normalize().as_slice()));
+    }
+    let lean = |facet: &OrientedFacet<D>| {
+        let lean = column(facet.normal) - &normal;
+        facet.area / total * &lean * lean.transpose()
+    };
+    let spread: DMatrix<f64> = facets.iter().map(lean).sum();
+    // the points of a coarse cylinder may be on two circles, which are on a sphere, too
+    if D == 3
+        && let Some(found) = Turned::through(points, spread, limit)
+    {
+        let Turned { centre, axis, radius, slope } = &found;
+        let side = side(&|x| found.from_axis(x));
+        let about = vector((axis * axis[axis.iamax()].signum()).as_slice());
+        let through = in_scene(centre);
+        return if slope.abs() <= ON_SHAPE {
+            format!("{side}cylinder of radius {} about {about} through {through}", readable(*radius, 4))
+        } else {
+            let angle = readable(slope.abs().atan().to_degrees(), 4);
+            format!("{side}cone of {angle} degrees to its axis {about} through {through}")
+        };
+    }
+    if let Some(Ball { centre, radius }) = Ball::through(points, limit) {
+        let kind = if D == 2 { "circle" } else { "sphere" };
+        let side = side(&|x| x - &centre);
+        return format!("{side}{kind} of radius {}, centre {}", readable(radius, 4), in_scene(&centre));
+    }
+    String::new()
+}
+
+fn column<const D: usize>(x: [f64; D]) -> DVector<f64> {
+    DVector::from_row_slice(&x)
+}
+
+/// A circle or a sphere.
+struct Ball {
+    centre: DVector<f64>,
+    radius: f64,
+}
+
+impl Ball {
+    /// Return the one through these points, from the equations x.x = 2 c.x + r^2 - c.c; `None` if a point is beside it.
+    fn through<const D: usize>(points: &[[f64; D]], limit: f64) -> Option<Self> {
+        let middle: DVector<f64> = points.iter().map(|&x| column(x)).sum::<DVector<f64>>() / points.len() as f64;
+        let apart: Vec<DVector<f64>> = points.iter().map(|&x| column(x) - &middle).collect();
+        let rows = DMatrix::from_fn(points.len(), D + 1, |i, c| if c < D { 2.0 * apart[i][c] } else { 1.0 });
+        let squares = DVector::from_iterator(points.len(), apart.iter().map(|x| x.norm_squared()));
+        let found = rows.try_svd(true, true, f64::EPSILON, SWEEPS)?.solve(&squares, f64::EPSILON).ok()?;
+        let centre = found.rows(0, D).into_owned();
+        let radius = (found[D] + centre.norm_squared()).sqrt();
+        let is_on = apart.iter().all(|x| ((x - &centre).norm() - radius).abs() <= limit);
+        (points.len() > D + 1 && is_on).then(|| Self { centre: centre + middle, radius })
+    }
+}
+
+/// A cylinder or a cone: the distance from the axis is `radius + slope t` at the place t along the axis from the
+/// centre.
+struct Turned {
+    centre: DVector<f64>,
+    axis: DVector<f64>,
+    radius: f64,
+    slope: f64,
+}
+
+impl Turned {
+    /// Return the one through these points by Gauss-Newton steps; `None` if a point is beside it. The normals of a
+    /// cylinder or a cone vary least along its axis, by their `spread`.
+    fn through<const D: usize>(points: &[[f64; D]], spread: DMatrix<f64>, limit: f64) -> Option<Self> {
+        let eigen = SymmetricEigen::new(spread);
+        let axis = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
+        let centre = points.iter().map(|&x| column(x)).sum::<DVector<f64>>() / points.len() as f64;
+        let radius = points.iter().map(|&x| (column(x) - &centre).norm()).sum::<f64>() / points.len() as f64;
+        let mut found = Self { centre, axis, radius, slope: 0.0 };
+        for _ in 0..STEPS {
+            let rows: Vec<DVector<f64>> = points.iter().map(|&x| found.derivatives(&column(x))).collect();
+            let errors = DVector::from_iterator(points.len(), points.iter().map(|&x| found.error(&column(x))));
+            let matrix = DMatrix::from_fn(points.len(), 2 * D + 2, |i, k| rows[i][k]);
+            // motions along the axis, and turns about it, change nothing
+            let step = matrix.try_svd(true, true, f64::EPSILON, SWEEPS)?.solve(&errors, 1e-9).ok()?;
+            found.centre -= step.rows(0, D);
+            found.axis = (found.axis - step.rows(D, D)).normalize();
+            found.radius -= step[2 * D];
+            found.slope -= step[2 * D + 1];
+        }
+        points.iter().all(|&x| found.error(&column(x)).abs() <= limit).then_some(found)
+    }
+
+    /// Return the vector from the axis to a point, across the axis.
+    fn from_axis(&self, x: &DVector<f64>) -> DVector<f64> {
+        let apart = x - &self.centre;
+        &apart - apart.dot(&self.axis) * &self.axis
+    }
+
+    /// Return by how much a point is beside the surface.
+    fn error(&self, x: &DVector<f64>) -> f64 {
+        self.from_axis(x).norm() - self.radius - self.slope * (x - &self.centre).dot(&self.axis)
+    }
+
+    /// Return the derivatives of the error by centre, axis, radius and slope.
+    fn derivatives(&self, x: &DVector<f64>) -> DVector<f64> {
+        let (apart, across) = (x - &self.centre, self.from_axis(x).normalize());
+        let along = apart.dot(&self.axis);
+        let by_centre = -&across + self.slope * &self.axis;
+        let by_axis = -along * &across - self.slope * &apart;
+        let parts = by_centre.iter().chain(&by_axis).copied().chain([-1.0, -along]);
+        DVector::from_iterator(2 * x.len() + 2, parts)
+    }
+}
+
+/// Gauss-Newton steps; from an axis that facets give to a few degrees, four reach the last digits.
+const STEPS: usize = 20;
+
+/// Most sweeps of a singular value decomposition, which would not end for a point on the axis.
+const SWEEPS: usize = 1000;
+
+/// Return a vector in words, without its roundoff.
+fn vector(v: &[f64]) -> String {
+    let rounded = |x: &f64| readable((x * 1e6).round() / 1e6 + 0.0, 4);
+    format!("({})", v.iter().map(rounded).collect::<Vec<_>>().join(", "))
+}
