@@ -106,7 +106,7 @@ fn shape<const D: usize>(facets: &[OrientedFacet<D>], points: &[[f64; D]], datum
         && let Some(found) = Turned::through(points, spread, limit)
     {
         let Turned { centre, axis, radius, slope } = &found;
-        let side = side(&|x| found.from_axis(x));
+        let side = side(&|x| found.off_axis(x));
         let about = vector((axis * axis[axis.iamax()].signum()).as_slice());
         let through = in_scene(centre);
         return if slope.abs() <= ON_SHAPE {
@@ -182,19 +182,19 @@ impl Turned {
     }
 
     /// Return the vector from the axis to a point, across the axis.
-    fn from_axis(&self, x: &DVector<f64>) -> DVector<f64> {
+    fn off_axis(&self, x: &DVector<f64>) -> DVector<f64> {
         let apart = x - &self.centre;
         &apart - apart.dot(&self.axis) * &self.axis
     }
 
     /// Return by how much a point is beside the surface.
     fn error(&self, x: &DVector<f64>) -> f64 {
-        self.from_axis(x).norm() - self.radius - self.slope * (x - &self.centre).dot(&self.axis)
+        self.off_axis(x).norm() - self.radius - self.slope * (x - &self.centre).dot(&self.axis)
     }
 
     /// Return the derivatives of the error by centre, axis, radius and slope.
     fn derivatives(&self, x: &DVector<f64>) -> DVector<f64> {
-        let (apart, across) = (x - &self.centre, self.from_axis(x).normalize());
+        let (apart, across) = (x - &self.centre, self.off_axis(x).normalize());
         let along = apart.dot(&self.axis);
         let by_centre = -&across + self.slope * &self.axis;
         let by_axis = -along * &across - self.slope * &apart;
