@@ -109,3 +109,29 @@ fn what_cannot_be_unloaded() {
     let scene = Scene::edited("patch", "[method]", "unload = { linear = { stiffness = 1e9 } }\n[method]");
     assert!(solve_here(&scene.path, &[]).warnings().contains("`unload` without load steps"));
 }
+
+/// The joint diagram of `meshes/bolt` with gaskets of the stiffness 1e5 under the head, ten times as stiff on the way back: a service load S unloads them, so
+/// that the bolt carries 100 + S Kb/(Kb + Kp) with the stiffness Kp of the sleeve and the unloaded gaskets, and S alone once the joint is open.
+#[test]
+fn a_gasket_under_a_bolt() {
+    let in_series = |young: f64, layer: f64| 1.0 / (4.0 / young + 1.0 / layer);
+    let bolt = in_series(2e5, 1e6);
+    let table = case("bolt").with_file_name("tighten.csv").display().to_string();
+    let method = format!("method={{steps={{table='{table}'}}}}");
+    for (unload, stiffness) in [(true, 1e6), (false, 1e5)] {
+        let of_pair = |pair: usize| {
+            let layer = format!("contact.{pair}.layer={{linear={{stiffness=1e5}}}}");
+            let unload = unload.then(|| format!("contact.{pair}.unload={{linear={{stiffness=1e6}}}}"));
+            std::iter::once(layer).chain(unload)
+        };
+        let sets: Vec<String> = [1, 2].into_iter().flat_map(of_pair).chain([method.clone()]).collect();
+        let sets: Vec<&str> = sets.iter().map(String::as_str).collect();
+        let run = solve_here(case("bolt"), &sets).converged();
+        let sleeve = 2.0 * in_series(5e4, stiffness);
+        for (step, service) in [0.0, 120.0, 240.0, 360.0, 30.0].into_iter().enumerate() {
+            let exact = (100.0 + service * bolt / (bolt + sleeve)).max(service);
+            let force = run.number(&format!("steps/{step}/pairs/0/force/0/1")).abs();
+            close(&format!("unload {unload}, step {step}"), force, exact, 1e-4);
+        }
+    }
+}
