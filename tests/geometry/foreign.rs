@@ -342,7 +342,8 @@ fn local_coordinates_of_input_files() {
     fs::write(scene.path.with_file_name("a.inp"), &text).expect("a file");
     let list = winkler(&["mesh", scene.path.to_str().expect("a path")]);
     assert!(
-        list.stdout.contains("group floor: 2 triangles, (3.0000, 0.0000, 0.0000) to (5.0000, 2.0000, 0.0000)"),
+        list.stdout
+            .contains("plane, normal (0.0000, 0.0000, -1.0000), (3.0000, 0.0000, 0.0000) to (5.0000, 2.0000, 0.0000)"),
         "{}",
         list.said()
     );

@@ -40,7 +40,7 @@ fn first_mistakes_have_advice() {
     let (scene, script) = (path("press/scene.toml"), path("press/press.geo"));
     // places of groups: is `lower_top` the curve that is meant?
     let mesh = winkler(&["mesh", &scene]);
-    assert!(mesh.stdout.contains("group lower_top: 20 lines, (0.0000, 1.0000) to (2.0000, 1.0000)"), "{}", mesh.said());
+    assert!(mesh.stdout.contains("group lower_top: 20 lines of lower, straight, normal (0.0000, 1.0000), (0.0000, 1.0000) to (2.0000, 1.0000)"), "{}", mesh.said());
     // a gap of five times the height of a block
     let warnings =
         |set: &str| solve(&scene, &["--set", "output.vtu=false", "--set", set]).report["warnings"].to_string();
