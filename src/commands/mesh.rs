@@ -3,7 +3,7 @@
 use super::shapes::SurfaceFacts;
 use super::{inputs, shapes};
 use crate::discretize::{Verified, find_group, verify};
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, Kind, Result, few};
 use crate::exchange::Serial;
 use crate::fem::Space;
 use crate::interrupt::Interrupt;
@@ -213,7 +213,7 @@ fn in_lines(facts: &MeshFacts) -> String {
         let kind = ["points", "lines", "triangles", "tetrahedra"][group.dimension];
         let (low, high) = (corner(&group.low), corner(&group.high));
         let beside =
-            if group.bounds.is_empty() { String::new() } else { format!(" of {}", group.bounds.join(" and ")) };
+            if group.bounds.is_empty() { String::new() } else { format!(" of {}", few(&group.bounds).join(", ")) };
         let shape = if group.shape.is_empty() { String::new() } else { format!(", {}", group.shape) };
         lines.push(format!("  group {}: {} {kind}{beside}{shape}, ({low}) to ({high})", group.name, group.simplices));
     }

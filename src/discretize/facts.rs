@@ -1,5 +1,6 @@
 //! What all ranks have of a body: the arrays of the model, and the facts that reports need.
 
+use super::partition::BodyRanks;
 use super::post::Post;
 use super::scene_body::SceneBody;
 use crate::contact::ContactPair;
@@ -65,14 +66,13 @@ impl BodyInfo {
 
 impl<const D: usize> SceneBody<'_, D> {
     /// Return what all ranks have of the body: the arrays of the model and the facts for reports. `checked` is the
-    /// result of the check of its mesh, and `owners` are the rank that owns the body or most of it, and all that own
-    /// nodes of it.
+    /// result of the check of its mesh.
     pub fn shared(
         &self,
         pairs: &[ContactPair],
         checked: &BodyCheck,
         plane: Plane,
-        owners: &(usize, Vec<usize>),
+        ranks: &BodyRanks,
     ) -> (BodySlot, BodyInfo) {
         let of_body = || self.segments.iter().map(|segment| &pairs[segment.pair]);
         let surface: f64 = of_body().map(|pair| pair.area.iter().sum::<f64>()).sum();
@@ -96,8 +96,8 @@ impl<const D: usize> SceneBody<'_, D> {
         let info = BodyInfo {
             unresisted: unresisted(slot.free_motions()),
             warning: self.locking(plane),
-            rank: owners.0,
-            ranks: owners.1.clone(),
+            rank: ranks.leader,
+            ranks: ranks.all.clone(),
             ..self.info(checked)
         };
         (slot, info)

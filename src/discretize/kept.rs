@@ -2,7 +2,7 @@
 //! makes only what differs.
 
 use super::pairs::{Contact, ContactFacts, KeptPairs, PairInputs};
-use super::partition::Partition;
+use super::partition::{BodyRanks, Partition};
 use super::scene_body::SceneBody;
 use crate::contact::ContactPair;
 use crate::fem::{Elasticity, Frame, NodalBlock, Space};
@@ -20,8 +20,8 @@ pub struct Kept<const D: usize> {
     pub rules: Vec<ContactSpec>,
     /// Distributions of nodes over the ranks.
     pub partitions: Vec<Rc<Partition>>,
-    /// Owner rank of each body, and all ranks that own nodes of it.
-    pub owners: Vec<(usize, Vec<usize>)>,
+    /// Ranks of each body.
+    pub owners: Vec<BodyRanks>,
 }
 
 impl<const D: usize> Default for Kept<D> {

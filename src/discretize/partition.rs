@@ -15,6 +15,15 @@ use std::cell::OnceCell;
 use std::collections::HashMap;
 use std::rc::Rc;
 
+/// The ranks of a body.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct BodyRanks {
+    /// The rank that owns the body or, if it is distributed, most of it.
+    pub leader: usize,
+    /// All ranks that own nodes of it.
+    pub all: Vec<usize>,
+}
+
 /// Bodies whose rows of K are in one matrix, with the owner of each of their nodes. It exists on the first rank.
 pub struct Partition {
     /// Indices of the bodies in the scene, in increasing order.

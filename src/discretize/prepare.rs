@@ -8,7 +8,7 @@ use super::facts::BodyInfo;
 use super::kept::{EarlierPair, Kept, MatrixInputs};
 use super::meshes::{KeptMeshes, Meshes};
 use super::pairs::{self, Contact, ContactFacts, Contacts};
-use super::partition::Partition;
+use super::partition::{BodyRanks, Partition};
 use super::scene_body::{SceneBody, parts};
 use super::verify::Verified;
 use super::{approach, chords, mechanism, obstacle};
@@ -64,8 +64,8 @@ pub struct ReplicatedProblem<const D: usize, P> {
 /// All bodies before their matrices are assembled, with the ranks that own their nodes.
 pub struct WholeProblem<'a, const D: usize> {
     bodies: Vec<SceneBody<'a, D>>,
-    /// Owner rank of each body, and all ranks that own nodes of it.
-    owners: Vec<(usize, Vec<usize>)>,
+    /// Ranks of each body.
+    owners: Vec<BodyRanks>,
     partitions: Vec<Rc<Partition>>,
     /// Whether every rank keeps all meshes, for an estimate of the error.
     keep: bool,
@@ -80,7 +80,7 @@ impl<const D: usize> WholeProblem<'_, D> {
     /// Return what a rank receives of each body.
     pub fn on(&self, rank: usize) -> Vec<Option<BodyMesh<D>>> {
         let of_body = |(index, body): (usize, &SceneBody<D>)| {
-            let is_owned = self.owners[index].0 == rank;
+            let is_owned = self.owners[index].leader == rank;
             match place_of(&self.partitions, index) {
                 Some((partition, number)) => Some(partition.restrict(&body.mesh, number, rank, self.keep)),
                 None => (is_owned || self.keep).then(|| BodyMesh { is_owned, ..body.mesh.clone() }),
@@ -138,8 +138,8 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     kept.owners = owners(&bodies, &kept.partitions, ranks);
     is_kept.iter_mut().enumerate().for_each(|(i, is_kept)| *is_kept &= before.owners.get(i) == Some(&kept.owners[i]));
     kept.rules = scene.rules().cloned().collect();
-    let facts = bodies.iter().zip(&*verified.checked).zip(&kept.owners);
-    let shared = facts.map(|((body, checked), owners)| body.shared(&pairs, checked, scene.plane, owners)).collect();
+    let share = |i: usize| bodies[i].shared(&pairs, &verified.checked[i], scene.plane, &kept.owners[i]);
+    let shared = (0..bodies.len()).map(share).collect();
     let shared =
         ReplicatedProblem { bodies: shared, pairs, rigid, contacts, mechanisms, fine, plan, is_kept, searched };
     let (owners, partitions) = (kept.owners.clone(), kept.partitions.clone());
@@ -237,16 +237,12 @@ fn partitions<const D: usize>(
 
 /// Return for each body the rank that owns it or most of it, and all ranks that own nodes of it. A body that is not
 /// distributed stays whole; such bodies are assigned so that all ranks get about equally many of their dofs.
-fn owners<const D: usize>(
-    bodies: &[SceneBody<D>],
-    partitions: &[Rc<Partition>],
-    ranks: usize,
-) -> Vec<(usize, Vec<usize>)> {
+fn owners<const D: usize>(bodies: &[SceneBody<D>], partitions: &[Rc<Partition>], ranks: usize) -> Vec<BodyRanks> {
     let dofs = |body: usize| if place_of(partitions, body).is_some() { 0 } else { bodies[body].mesh.space.dofs() };
     let owners = crate::parallel::owners(&(0..bodies.len()).map(dofs).collect::<Vec<_>>(), ranks);
     let of_body = |(body, owner): (usize, usize)| match place_of(partitions, body) {
-        Some((partition, number)) => (partition.leader(number), partition.ranks(number)),
-        None => (owner, vec![owner]),
+        Some((partition, number)) => BodyRanks { leader: partition.leader(number), all: partition.ranks(number) },
+        None => BodyRanks { leader: owner, all: vec![owner] },
     };
     owners.into_iter().enumerate().map(of_body).collect()
 }

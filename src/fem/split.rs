@@ -139,11 +139,11 @@ fn jumps<const D: usize>(space: &Space<D>, elasticity: &Elasticity, node: u32, c
         let middle = |c: usize| corners().map(|x| x[c]).sum::<f64>() / (D + 1) as f64;
         let near = std::array::from_fn(|c| at[c] + BESIDE * (middle(c) - at[c]));
         let near = space.in_scene(near);
-        elasticity.at(cell, near).ok().zip(elasticity.expansion(cell, near).ok())
+        (elasticity.at(cell, near).ok(), elasticity.expansion(cell, near).ok())
     };
-    let [one, other] = [beside(cells[0]), beside(cells[1])];
-    one.zip(other)
-        .is_some_and(|((one, expansion), (other, of_other))| differ(&one, &other) || is_jump(&[expansion, of_other]))
+    let [(stiffness, expansion), (other_stiffness, other_expansion)] = cells.map(beside);
+    stiffness.zip(other_stiffness).is_some_and(|(one, other)| differ(&one, &other))
+        || expansion.zip(other_expansion).is_some_and(|(one, other)| is_jump(&[one, other]))
 }
 
 /// Return whether two laws give stresses that differ by more than a share of [`JUMP`] for some strain of one component.

@@ -20,7 +20,7 @@ pub use closing::{UNSETTLED, UnitWords, warning_lines};
 pub use fields::{BodyField, CellKind, FieldArray, LargestStress, UnstructuredGrid};
 pub use folder::{Folder, make_folder, refuse_foreign, safe_name, write_whole};
 pub use mark::{Mark, Role};
-pub use plot::{Color, Plot, PlotAxis, Series, Style};
+pub use plot::{Color, LEGEND, Plot, PlotAxis, Series, Style};
 pub use report::{
     BalanceReport, BodyReport, EstimateReport, Extent, ForceReport, InnerTimes, IntervalReport, LISTED, ObstacleReport,
     PairEstimate, PairReport, PairResult, ReactionReport, Report, RoundReport, StepReport, TensionReport, UnmetReport,

@@ -94,8 +94,8 @@ impl PlotAxis {
 
 /// Width and height of a picture in pixels.
 const SIZE: [f64; 2] = [900.0, 560.0];
-/// Most names in a legend.
-const NAMES: usize = 24;
+/// Most names in a legend: with 19 pixels each they fill the height of a picture.
+pub const LEGEND: usize = 24;
 
 /// Colours of Okabe and Ito that stand out on white: colour-blind readers can tell them apart.
 const PALETTE: [&str; 7] = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000"];
@@ -256,7 +256,7 @@ impl Pen {
 /// Draw the names of series, each behind a sample.
 fn draw_legend(entries: &[(String, Pen)], left: f64, svg: &mut String) {
     let row = |k: usize| 36.0 + 19.0 * k as f64;
-    for (k, (label, pen)) in entries.iter().take(NAMES).enumerate() {
+    for (k, (label, pen)) in entries.iter().take(LEGEND).enumerate() {
         let line = [[left, row(k)], [left + 30.0, row(k)]];
         Pen { style: if pen.style == Style::LineMarkers { Style::Line } else { pen.style }, ..*pen }.draw(&line, svg);
         if pen.style == Style::LineMarkers {
@@ -264,8 +264,8 @@ fn draw_legend(entries: &[(String, Pen)], left: f64, svg: &mut String) {
         }
         text(svg, [left + 36.0 + if let Style::Numbered(_) = pen.style { 18.0 } else { 0.0 }, row(k) + 4.0], "", label);
     }
-    if entries.len() > NAMES {
-        text(svg, [left + 36.0, row(NAMES) + 4.0], "", &format!("and {} more", entries.len() - NAMES));
+    if entries.len() > LEGEND {
+        text(svg, [left + 36.0, row(LEGEND) + 4.0], "", &format!("and {} more", entries.len() - LEGEND));
     }
 }
 

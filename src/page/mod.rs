@@ -8,8 +8,8 @@ pub use surface::Surface;
 use crate::output::closing::DIGITS;
 use crate::output::folder::REPORT;
 use crate::output::{
-    BodyReport, ForceReport, Mark, ObstacleReport, PairReport, PairResult, Plot, ReactionReport, Report, RunStatus,
-    TensionReport, UNSETTLED, busiest, escape, trimmed,
+    BodyReport, ForceReport, LEGEND, Mark, ObstacleReport, PairReport, PairResult, Plot, ReactionReport, Report,
+    RunStatus, TensionReport, UNSETTLED, busiest, escape, trimmed,
 };
 use crate::problem::{Units, label};
 use serde_json::Value;
@@ -17,14 +17,12 @@ use serde_json::Value;
 /// Name of the page in the folder of results.
 pub const FILE: &str = "report.html";
 
-/// Most rows of a table; the files of results have all.
+/// Most rows of a table, of 31 pixels each: seven windows of 900 pixels. The files of results have all.
 const ROWS: usize = 200;
 
-/// Most pairs whose numbers stand above the picture, which is to begin on the first screen.
+/// Most pairs whose numbers stand above the picture. With six it begins 450 pixels below the top of the page, in the
+/// middle of a window of 900.
 const FIRST: usize = 6;
-
-/// Most bodies with a box each that shows or hides them.
-const NAMES: usize = 24;
 
 /// What a page shows.
 pub struct Page<'a> {
@@ -408,7 +406,7 @@ fn warnings(warnings: &[String]) -> String {
 
 /// Return a box for each body that shows or hides it, where there are neither one nor too many.
 fn names(bodies: &[Surface]) -> String {
-    if !(2..=NAMES).contains(&bodies.len()) {
+    if !(2..=LEGEND).contains(&bodies.len()) {
         return String::new();
     }
     let name = |(k, body): (usize, &Surface)| {

@@ -3,7 +3,7 @@
 
 use crate::fem::{lagrange, length};
 use crate::linalg::bounds;
-use crate::output::{BodyField, CellKind, Mark, Role, UnstructuredGrid};
+use crate::output::{BodyField, CellKind, LEGEND, Mark, Role, UnstructuredGrid};
 use crate::problem::order::Order;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -274,9 +274,6 @@ pub fn view(bodies: &[Surface], contacts: &[Surface], marks: &[Mark], is_space: 
     })
 }
 
-/// Most groups of a role that its legend names.
-const NAMES: usize = 24;
-
 /// Return the roles of marked places, each with the words of its legend, which name the groups, and its colour.
 fn roles(marks: &[Mark]) -> Vec<[String; 3]> {
     let all = [
@@ -288,8 +285,8 @@ fn roles(marks: &[Mark]) -> Vec<[String; 3]> {
     ];
     let legend = |(role, name, words, color): (Role, &str, &str, &str)| {
         let on: BTreeSet<&str> = marks.iter().filter(|mark| mark.role == role).map(|mark| mark.on.as_str()).collect();
-        let names = on.iter().take(NAMES).copied().collect::<Vec<_>>().join(", ");
-        let more = if on.len() > NAMES { ", ..." } else { "" };
+        let names = on.iter().take(LEGEND).copied().collect::<Vec<_>>().join(", ");
+        let more = if on.len() > LEGEND { ", ..." } else { "" };
         (!on.is_empty()).then(|| [name.to_owned(), format!("{words}: {names}{more}"), color.to_owned()])
     };
     all.into_iter().filter_map(legend).collect()

@@ -7,13 +7,19 @@ use proptest::sample::{Index, select};
 use proptest::test_runner::{Config, RngSeed, TestRunner};
 use std::path::Path;
 
-/// Valid files: their names tell which reader they are for.
-const SEEDS: [(&str, &[u8]); 5] = [
-    ("text2.msh", include_bytes!("seeds/text2.msh")),
-    ("text3.msh", include_bytes!("seeds/text3.msh")),
-    ("binary3.msh", include_bytes!("seeds/binary3.msh")),
-    ("old3q.msh", include_bytes!("seeds/old3q.msh")),
-    ("blocks.inp", include_bytes!("seeds/blocks.inp")),
+/// A valid file, whose name tells which reader it is for.
+#[derive(Debug, Clone, Copy)]
+struct Seed {
+    name: &'static str,
+    bytes: &'static [u8],
+}
+
+const SEEDS: [Seed; 5] = [
+    Seed { name: "text2.msh", bytes: include_bytes!("seeds/text2.msh") },
+    Seed { name: "text3.msh", bytes: include_bytes!("seeds/text3.msh") },
+    Seed { name: "binary3.msh", bytes: include_bytes!("seeds/binary3.msh") },
+    Seed { name: "old3q.msh", bytes: include_bytes!("seeds/old3q.msh") },
+    Seed { name: "blocks.inp", bytes: include_bytes!("seeds/blocks.inp") },
 ];
 
 /// What stands in the place of a piece: nothing, signs, and numbers at the ends of what numbers can be.
@@ -66,18 +72,18 @@ type Change = (Index, usize, &'static str);
 
 #[test]
 fn damaged_files_never_end_the_program() {
-    SEEDS.iter().for_each(|(name, seed)| read_any(name, seed));
+    SEEDS.iter().for_each(|seed| read_any(seed.name, seed.bytes));
     let change = (any::<Index>(), 0..40_usize, select(&WORDS[..]));
     let changes = (select(&SEEDS[..]), proptest::collection::vec(change, 1..4));
     let config =
         Config { cases: 2000, rng_seed: RngSeed::Fixed(1211_7151), failure_persistence: None, ..Config::default() };
-    let test = |((name, seed), changes): ((&str, &[u8]), Vec<Change>)| {
-        let mut bytes = seed.to_vec();
+    let test = |(seed, changes): (Seed, Vec<Change>)| {
+        let mut bytes = seed.bytes.to_vec();
         for (start, length, word) in changes {
             let start = start.index(bytes.len());
             bytes.splice(start..(start + length).min(bytes.len()), word.bytes());
         }
-        read_any(name, &bytes);
+        read_any(seed.name, &bytes);
         Ok(())
     };
     if let Err(failure) = TestRunner::new(config).run(&changes, test) {
