@@ -16,6 +16,14 @@ fn extent(measure: Measure, contact: f64, open: f64) -> Extent {
     }
 }
 
+/// Return the compressions of pair `i` beyond those that stay without pressure: a layer that was crushed is open below
+/// these.
+pub fn beyond_rest(done: &Done, i: usize) -> Vec<f64> {
+    let (pair, range) = (&done.model().pairs[i], done.model().range(i));
+    let compression = done.outcome.layer.compression[range].iter().enumerate();
+    compression.map(|(point, c)| c - pair.law.rest(point)).collect()
+}
+
 /// Return the size of the contact of pair `i`, and in the plane the points where it begins or ends, in the order of the
 /// contact points.
 ///
@@ -24,13 +32,13 @@ fn extent(measure: Measure, contact: f64, open: f64) -> Extent {
 pub fn of(done: &Done, i: usize) -> (Extent, Vec<[f64; 3]>) {
     let (model, layer) = (done.model(), &done.outcome.layer);
     let (pair, range) = (&model.pairs[i], model.range(i));
-    let (c, p) = (&layer.compression[range.clone()], &layer.pressure[range]);
+    let (c, p) = (beyond_rest(done, i), &layer.pressure[range]);
     if done.built.discrete.specs[i].slip.is_some() {
         return (extent(pair.measure, pair.area.iter().sum(), 0.0), Vec::new());
     }
     let neighbours = done.built.discrete.contacts[i].surface.neighbours();
     if !pair.measure.is_along_curve() || neighbours.is_empty() {
-        let areas = || pair.area.iter().zip(c);
+        let areas = || pair.area.iter().zip(&c);
         let sum = |counts: fn(f64) -> bool| areas().filter(|(_, c)| counts(**c)).fold(0.0, |sum, (area, _)| sum + area);
         return (extent(pair.measure, sum(|c| c > 0.0), sum(|c| c < 0.0)), Vec::new());
     }

@@ -307,8 +307,9 @@ pub fn pair(done: &Done, i: usize, approach: Option<f64>) -> PairResult {
     let sides = done.built.discrete.sides(i);
     let (extent, contact_ends) = extent::of(done, i);
     let (peak, peak_pressure) = largest_pressure(p);
-    let closed = || (0..pair.len()).filter(|&q| c[q] > pair.law.rest(q));
-    let opening: Vec<f64> = c.iter().map(|c| (-c).max(0.0)).collect();
+    let elastic = extent::beyond_rest(done, i);
+    let closed = || (0..pair.len()).filter(|&q| elastic[q] > 0.0);
+    let opening: Vec<f64> = elastic.iter().map(|c| (-c).max(0.0)).collect();
     let [least_gap, largest_gap] = range_of(pair.gap.iter().copied());
     PairResult {
         shear: done.built.discrete.specs[i].slip.is_some(),

@@ -135,3 +135,26 @@ fn a_gasket_under_a_bolt() {
         }
     }
 }
+
+/// The same joint under a service load beyond the one that opens it, by which the gaskets, which stay compressed by 4.5e-4, come apart by 2e-4: no point is
+/// closed, and the joint is open by that.
+#[test]
+fn a_crushed_gasket_is_open() {
+    let scene = Scene::edited("bolt", "title = \"A bolt with preload\"", "title = \"An open joint\"");
+    let (bolt, sleeve) = (1.0 / (4.0 / 2e5 + 1e-6), 2.0 / (4.0 / 5e4 + 1e-6));
+    let service = 100.0 * (bolt + sleeve) / sleeve + 2e-4 * bolt;
+    let table = scene.path.with_file_name("tighten.csv");
+    std::fs::write(&table, format!("service\n0\n{}\n", service / 3.0)).expect("a table");
+    let layers = [1, 2].map(|pair| {
+        [("layer", "1e5"), ("unload", "1e6")]
+            .map(|(key, stiffness)| format!("contact.{pair}.{key}={{linear={{stiffness={stiffness}}}}}"))
+    });
+    let sets: Vec<&str> = layers.iter().flatten().map(String::as_str).collect();
+    let run = solve_here(&scene.path, &sets).converged();
+    let closed = |step: usize| run.number(&format!("steps/{step}/pairs/1/closed"));
+    assert!(closed(0) > 0.0 && closed(1) == 0.0);
+    assert_eq!(run.number("pairs/1/contact_length"), 0.0);
+    close("opening", run.number("pairs/1/opening/1"), 2e-4, 1e-2);
+    // the meshes themselves have not come apart
+    assert!(run.number("pairs/1/peak_compression") > 2e-4);
+}
