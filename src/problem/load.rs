@@ -253,7 +253,9 @@ impl From<Load> for LoadKeys {
             LoadKind::Turning { force, moment } => {
                 Self { force: Some(force.into()), moment: Some(moment.into()), rigid: Some(true.into()), ..keys }
             }
-            LoadKind::Force { total, rigid } => Self { force: Some(total.into()), rigid: Some(rigid.into()), ..keys },
+            LoadKind::Force { total, rigid } => {
+                Self { force: Some(total.into()), rigid: rigid.then(|| true.into()), ..keys }
+            }
         }
     }
 }

@@ -141,7 +141,7 @@ fn build_on(
     let MeshFacts { split, straightened, notes, .. } = mesh.facts();
     warnings.extend(warnings::in_parts(*split).into_iter().chain(warnings::made_straight(*straightened)));
     warnings.extend(notes.iter().cloned());
-    warnings.extend(warnings::without_history(&scene));
+    warnings.extend(warnings::without_history(&scene).into_iter().chain(warnings::stiffer_than_diamond(&scene)));
     warnings.extend(inner.applied_once().into_iter().chain(inner.idle_options()));
     let has_page = scene.output.report && session.rank() == 0;
     let marks = if has_page && marks.is_empty() { mesh.marks(&stepped.bodies, &discrete.model.pairs) } else { marks };

@@ -49,6 +49,27 @@ pub fn without_history(scene: &Scene) -> Option<String> {
     })
 }
 
+/// Young's modulus of diamond in pascals. No solid is stiffer.
+const DIAMOND: f64 = 1.2e12;
+
+/// Return the warning of bodies that are stiffer than any solid in the unit of stresses that the scene names, if any: most
+/// often their modulus is in pascals, and the loads are not.
+pub fn stiffer_than_diamond(scene: &Scene) -> Option<String> {
+    let units = scene.units.as_ref()?;
+    let (_, pascals) = [("Pa", 1.0), ("kPa", 1e3), ("MPa", 1e6), ("N/mm²", 1e6), ("N/mm^2", 1e6), ("GPa", 1e9)]
+        .into_iter()
+        .find(|(name, _)| *name == units.stress)?;
+    let body = scene.bodies.iter().find(|body| body.young.as_ref().is_some_and(|young| young.number() * pascals > DIAMOND))?;
+    let young = body.young.as_ref()?.number();
+    Some(format!(
+        "young = {} of `{}` is more than diamond has, {} {}: is it in the units of the scene?",
+        sci(young, 1),
+        body.name,
+        sci(DIAMOND / pascals, 1),
+        units.stress
+    ))
+}
+
 /// Return the warning of elements that were split, if any.
 pub fn in_parts(split: usize) -> Option<String> {
     let what = "quadrangles, hexahedra, prisms or pyramids of the mesh were split into triangles or tetrahedra";

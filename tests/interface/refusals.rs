@@ -364,6 +364,16 @@ fn a_body_that_slides_freely_without_load() {
     assert!(run.contact()["pressure"].iter().all(|p| (p / 10.0 - 1.0).abs() < 1e-10));
 }
 
+/// A modulus in pascals beside pressures in megapascals is said, and one of a stiff solid is not.
+#[test]
+fn a_modulus_in_pascals() {
+    let cases = [("mm, MPa", "2.1e11", true), ("m, Pa", "2.1e11", false), ("mm, MPa", "1e6", false), ("mm, psi", "2.1e11", false)];
+    for (units, young, is_said) in cases {
+        let run = solve(case("patch"), &["--set", &format!("units='{units}'"), "--set", &format!("body.0.young={young}")]).converged();
+        assert_eq!(run.warnings().contains("more than diamond has, 1.2e+06 MPa"), is_said, "{units}, {young}: {}", run.warnings());
+    }
+}
+
 #[test]
 fn a_body_that_nothing_holds() {
     let run = solve(pushed_aside(), &[]);
