@@ -8,7 +8,7 @@ use super::scene_body::{elasticity_of, refusal, too_large};
 use crate::error::{Error, Result};
 use crate::exchange::Plain;
 use crate::fem::assemble::{Defect, InitialLoad};
-use crate::fem::{ElasticBody, NodeGraph, Prolongation, assemble, rigid, support};
+use crate::fem::{Loads, NodeGraph, Prolongation, assemble, rigid, support};
 use crate::linalg::{Csr, countable};
 use crate::mesh::Mesh;
 use crate::model::{Body, BodyCounts, BodyFacts, BodySlot, Distribution, InterfaceDofs};
@@ -69,8 +69,7 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
         if body.mesh.is_owned {
             let initial = initial_load(spec, &body, &self.mesh.path)?;
             slot.heat = initial.energy;
-            let loads = BodyLoads { force: body.mesh.load_vector(), initial };
-            self.give_solver(spec, &mut body, loads, before, slot, info.rank)?;
+            self.give_solver(spec, &mut body, &initial, before, slot, info.rank)?;
         }
         let body = Rc::new(body);
         if body.mesh.is_owned {
@@ -88,20 +87,20 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
         &mut self,
         spec: &BodySpec,
         fem: &mut FemBody<D>,
-        loads: BodyLoads,
+        initial: &InitialLoad,
         before: EarlierBody,
         slot: &mut BodySlot,
         owner: usize,
     ) -> Result<()> {
         let is_owner = owner == self.rank;
         if let Some((mut body, BodySlot { scale, row_stiffness, .. })) = before.serving {
-            body.reload(loads.force, &loads.initial, fem.mesh.prescribed())?;
+            body.reload(fem.mesh.load_vector(), initial, fem.mesh.prescribed())?;
             (slot.local, slot.scale, slot.row_stiffness) = (Some(body), scale, row_stiffness);
             // the sums of all ranks are known
             slot.row_stiffness.iter_mut().filter(|_| !is_owner).for_each(|stiffness| *stiffness = 0.0);
         } else {
             self.assemblies += usize::from(is_owner);
-            self.assemble(spec, fem, loads, slot)?;
+            self.assemble(spec, fem, initial, slot)?;
             slot.local.iter_mut().for_each(|body| body.count_on(before.counts));
         }
         slot.scale = if is_owner { slot.scale } else { 0.0 };
@@ -110,9 +109,15 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
 
     /// Assemble the matrix of a body, all of it or the rows of this rank, and make its solver, which takes the contact
     /// rows.
-    fn assemble(&mut self, spec: &BodySpec, fem: &mut FemBody<D>, loads: BodyLoads, slot: &mut BodySlot) -> Result<()> {
+    fn assemble(
+        &mut self,
+        spec: &BodySpec,
+        fem: &mut FemBody<D>,
+        initial: &InitialLoad,
+        slot: &mut BodySlot,
+    ) -> Result<()> {
         let mesh = &mut fem.mesh;
-        let prescribed = mesh.prescribed();
+        let (mut force, prescribed) = (mesh.load_vector(), mesh.prescribed());
         let modes = mesh.free_motions().iter();
         let mut unconstrained_modes: Vec<Vec<f64>> = modes.map(|motion| mesh.dofs_of(motion)).collect();
         unconstrained_modes.iter_mut().for_each(|motion| prescribed.iter().for_each(|entry| motion[entry.0] = 0.0));
@@ -122,12 +127,15 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
         if let Some(owned) = &owned {
             graph = graph.of(|node| owned.is_own::<D>(node));
         }
-        let mut body = elastic_body(spec, fem, &self.mesh.path, &graph, loads, prescribed)?;
+        let mut stiffness = stiffness(spec, fem, &self.mesh.path, &graph)?;
         drop(graph);
-        slot.scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
-        slot.row_stiffness = rows.stiffness_of_nodes(&body.stiffness, D);
+        // These rows belong to other ranks.
+        (0..force.len()).filter(|&i| stiffness.range(i).is_empty()).for_each(|i| force[i] = 0.0);
+        let mut loads = support(&mut stiffness, force, initial, prescribed);
+        slot.scale = stiffness.diagonal(0).into_iter().fold(0.0, f64::max);
+        slot.row_stiffness = rows.stiffness_of_nodes(&stiffness, D);
         if let Some(owned) = &owned {
-            body = owned.restrict::<D>(body);
+            (stiffness, loads) = (owned.restrict::<D>(stiffness), owned.distribution.restrict(loads));
         }
         let mesh = &fem.mesh;
         let interpolation = self.factory.wants_interpolation(&slot.name).then(|| match &owned {
@@ -140,7 +148,8 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
         let body = self.factory.make(Assembled {
             name: slot.name.clone(),
             dimension: D,
-            body,
+            stiffness,
+            loads,
             distribution: owned.map(|owned| owned.distribution),
             rows,
             near_null_space: &near_null_space,
@@ -152,24 +161,8 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
     }
 }
 
-/// The loads of a body at its dofs.
-struct BodyLoads {
-    /// f without initial strains.
-    force: Vec<f64>,
-    /// Those of its initial strains.
-    initial: InitialLoad,
-}
-
-/// Assemble K of a body on its graph, with f and the supports. If the graph has the rows of some nodes only, so have K
-/// and f. `path` is that of the mesh.
-fn elastic_body<const D: usize>(
-    spec: &BodySpec,
-    fem: &FemBody<D>,
-    path: &Path,
-    graph: &NodeGraph,
-    loads: BodyLoads,
-    prescribed: Vec<(usize, f64)>,
-) -> Result<ElasticBody> {
+/// Assemble K of a body on its graph, which may have the rows of some nodes only. `path` is that of the mesh.
+fn stiffness<const D: usize>(spec: &BodySpec, fem: &FemBody<D>, path: &Path, graph: &NodeGraph) -> Result<Csr> {
     let (name, BodyMesh { space, held, springs, .. }) = (&spec.name, &fem.mesh);
     countable(&format!("the stiffness matrix of body `{}`", name.value), graph.entries::<D>())?;
     let mut stiffness = assemble::stiffness(space, graph, &held.frame, &fem.elasticity)
@@ -179,10 +172,7 @@ fn elastic_body<const D: usize>(
         return Err(Error::scene(&spec.elasticity().place, message).label("far too large"));
     }
     springs.iter().for_each(|springs| assemble::add_blocks(graph, &held.frame, springs, &mut stiffness));
-    let BodyLoads { mut force, initial } = loads;
-    // These rows belong to other ranks.
-    (0..force.len()).filter(|&i| stiffness.range(i).is_empty()).for_each(|i| force[i] = 0.0);
-    Ok(support(stiffness, force, &initial, prescribed))
+    Ok(stiffness)
 }
 
 /// Return the load of the initial strains of a body at all dofs. Rows of nodes that this rank does not own are not
@@ -257,8 +247,10 @@ pub struct Assembled<'a> {
     pub name: String,
     /// Space dimension, which is the block size of the matrix.
     pub dimension: usize,
-    /// K, f and supports on all dofs, or on those of this rank.
-    pub body: ElasticBody,
+    /// K on all dofs, or the rows of those of this rank. The plan says what takes it.
+    pub stiffness: Csr,
+    /// f and supports on these dofs.
+    pub loads: Loads,
     /// Distribution of the dofs, if the body is distributed.
     pub distribution: Option<Distribution>,
     /// All contact rows of the body, pair by pair. The columns are its dofs, or those of the nodes that this rank has.
@@ -268,7 +260,7 @@ pub struct Assembled<'a> {
     pub near_null_space: &'a dyn Fn() -> Vec<Vec<f64>>,
     /// Displacements of the rigid motions that supports and springs leave, on these dofs.
     pub unconstrained_modes: Vec<Vec<f64>>,
-    /// Interpolation of displacements from linear ones, if it was requested. The rows are the dofs of `body`. The
+    /// Interpolation of displacements from linear ones, if it was requested. The rows are those of K. The
     /// columns belong to this body alone, or to all bodies of the matrix if the dofs are distributed.
     pub interpolation: Option<Prolongation>,
 }

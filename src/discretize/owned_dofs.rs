@@ -1,6 +1,6 @@
 //! What one rank has of the dofs of a distributed body.
 
-use crate::fem::{ElasticBody, Prolongation};
+use crate::fem::Prolongation;
 use crate::linalg::Csr;
 use crate::model::Distribution;
 use serde::{Deserialize, Serialize};
@@ -41,14 +41,13 @@ impl OwnedDofs {
         (*first..first + own.len()).contains(&(D * self.number[node] as usize))
     }
 
-    /// Restrict a body that was assembled for owned nodes to the owned dofs. The columns of K become those of the
-    /// matrix with its rows.
-    pub fn restrict<const D: usize>(&self, body: ElasticBody) -> ElasticBody {
-        let (own, loads) = (&self.distribution.owned_positions, self.distribution.restrict(&body));
-        let Csr { ptr, mut col, mut values, .. } = body.stiffness;
+    /// Restrict K, which was assembled for owned nodes, to the owned dofs. Its columns become those of the matrix with
+    /// its rows.
+    pub fn restrict<const D: usize>(&self, stiffness: Csr) -> Csr {
+        let Csr { ptr, mut col, mut values, .. } = stiffness;
         let mut starts = vec![0];
         let mut row = Vec::new();
-        for &dof in own {
+        for &dof in &self.distribution.owned_positions {
             let range = ptr[dof as usize] as usize..ptr[dof as usize + 1] as usize;
             let number = |&j: &i32| D as i32 * self.number[j as usize / D] as i32 + j % D as i32;
             row.clear();
@@ -59,10 +58,6 @@ impl OwnedDofs {
             }
             starts.push(range.end as i32);
         }
-        ElasticBody {
-            stiffness: Csr { columns: self.distribution.total, ptr: starts, col, values },
-            held: body.held,
-            ..loads
-        }
+        Csr { columns: self.distribution.total, ptr: starts, col, values }
     }
 }

@@ -524,14 +524,12 @@ pub fn initial_load<const D: usize>(
     Ok(load)
 }
 
-/// A discretised elastic body: stiffness K, load f, and the terms that were eliminated with the prescribed dofs.
+/// The load f of a discretised elastic body, and the terms that were eliminated from K with the prescribed dofs.
 ///
 /// A prescribed dof c with the value u_c stays as a row of K with one entry, `K[c][c]` = a typical diagonal, and `f[c]
 /// = K[c][c] u_c`. Its residual then vanishes at the prescribed value. Its column is moved to the right-hand side.
 #[derive(Debug, Clone, Default)]
-pub struct ElasticBody {
-    /// Stiffness matrix K, symmetric positive semidefinite.
-    pub stiffness: Csr,
+pub struct Loads {
     /// Load vector f, one entry a dof.
     pub load: Vec<f64>,
     /// Prescribed (dof, value), sorted by dof.
@@ -544,7 +542,7 @@ pub struct ElasticBody {
     /// Constant to be added to u'Ku + 2 lifting'u to give twice the strain energy: u_c'K_cc u_c with the original K_cc
     /// less the value with the scaled diagonal, and what initial strains add.
     pub strain_constant: f64,
-    /// Entries of K that [`ElasticBody::reload`] needs; empty where it is not used.
+    /// Entries of K that [`Loads::reload`] needs; empty where it is not used.
     pub held: Couplings,
 }
 
@@ -558,7 +556,7 @@ pub struct Couplings {
     diagonal: f64,
 }
 
-impl ElasticBody {
+impl Loads {
     /// Replace the loads f without those of initial strains, one entry a dof, the `initial` ones, and the values at the
     /// same prescribed dofs (dof, value).
     pub fn reload(&mut self, load: Vec<f64>, initial: &InitialLoad, mut prescribed: Vec<(usize, f64)>) {
@@ -611,12 +609,7 @@ impl ElasticBody {
 ///
 /// `prescribed` holds (dof, value), sorted, without repetition. Empty rows of K belong to other ranks, which also
 /// account for their energies. `initial` is the load of initial strains, which f does not have.
-pub fn support(
-    mut stiffness: Csr,
-    load: Vec<f64>,
-    initial: &InitialLoad,
-    prescribed: Vec<(usize, f64)>,
-) -> ElasticBody {
+pub fn support(stiffness: &mut Csr, load: Vec<f64>, initial: &InitialLoad, prescribed: Vec<(usize, f64)>) -> Loads {
     let n = load.len();
     let mut is_free = vec![true; n];
     prescribed.iter().for_each(|entry| is_free[entry.0] = false);
@@ -635,9 +628,9 @@ pub fn support(
             }
         }
     }
-    let mut body = ElasticBody { stiffness, held: Couplings { columns, diagonal }, ..ElasticBody::default() };
-    body.reload(load, initial, prescribed);
-    body
+    let mut loads = Loads { held: Couplings { columns, diagonal }, ..Loads::default() };
+    loads.reload(load, initial, prescribed);
+    loads
 }
 
 #[cfg(test)]
@@ -661,10 +654,11 @@ mod tests {
     fn a_prescribed_value_keeps_energies_and_equilibrium() {
         for heat in [InitialLoad::default(), initial(1.0), initial(-2.0)] {
             let of_heat = |i: usize| heat.force.get(i).copied().unwrap_or(0.0);
-            let body = support(springs(), vec![5.0, 0.7], &heat, vec![(1, 0.4)]);
+            let mut stiffness = springs();
+            let body = support(&mut stiffness, vec![5.0, 0.7], &heat, vec![(1, 0.4)]);
             let u = [(5.0 + of_heat(0) + 0.4) / 3.0, 0.4];
             let mut ku = [0.0; 2];
-            body.stiffness.multiply(&u, &mut ku);
+            stiffness.multiply(&u, &mut ku);
             let residual: f64 = (0..2).map(|i| (body.load[i] - ku[i]).abs()).sum();
             assert!(residual < 1e-15, "{residual}");
             let mut full = [0.0; 2];
@@ -678,13 +672,13 @@ mod tests {
         }
     }
 
-    /// A reloaded body equals a body that is made with the other loads and prescribed values.
+    /// Reloaded loads equal those that are made with the other values.
     #[test]
     fn a_body_takes_other_loads() {
         for (u, heat) in [(0.4, InitialLoad::default()), (0.0, initial(1.0)), (0.4, initial(3.0))] {
-            let mut body = support(springs(), vec![1.0, 2.0], &initial(-1.0), vec![(1, -0.3)]);
+            let mut body = support(&mut springs(), vec![1.0, 2.0], &initial(-1.0), vec![(1, -0.3)]);
             body.reload(vec![5.0, 0.7], &heat, vec![(1, u)]);
-            let new = support(springs(), vec![5.0, 0.7], &heat, vec![(1, u)]);
+            let new = support(&mut springs(), vec![5.0, 0.7], &heat, vec![(1, u)]);
             assert_eq!((&body.load, &body.prescribed, &body.lifting), (&new.load, &new.prescribed, &new.lifting));
             assert_eq!([body.energy_constant, body.strain_constant], [new.energy_constant, new.strain_constant]);
         }

@@ -1,7 +1,7 @@
 //! Finite elements on one body: P1 and P2 simplices, in the plane those of any order, linear elasticity, assembly into
 //! sparse rows.
 //!
-//! Data flow: [`Mesh`](crate::mesh::Mesh) group -> [`Space`] -> [`assemble`] -> [`ElasticBody`] {K, f, supports}.
+//! Data flow: [`Mesh`](crate::mesh::Mesh) group -> [`Space`] -> [`assemble`] -> K and [`Loads`] {f, supports}.
 //! Afterwards [`displacement`] has the stresses of a displacement. Degrees of freedom are numbered `D * node +
 //! component`.
 
@@ -23,7 +23,7 @@ pub mod surface;
 mod tests;
 
 pub use crate::linalg::{cross, length, minus, pad, unit};
-pub use assemble::{ElasticBody, NodalBlock, NodalForces, NodeGraph, support};
+pub use assemble::{Loads, NodalBlock, NodalForces, NodeGraph, support};
 pub use elasticity::Elasticity;
 pub use element::EDGES;
 pub use facets::{Facets, area_vector};

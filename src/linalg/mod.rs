@@ -142,10 +142,6 @@ impl Csr {
         debug_assert_eq!(x.len(), self.columns);
         for (i, y) in y.iter_mut().enumerate() {
             let range = self.range(i);
-            if range.len() == self.columns {
-                *y = dot_of_full(&self.values[range], x);
-                continue;
-            }
             *y = self.col[range.clone()].iter().zip(&self.values[range]).map(|(&j, a)| a * x[j as usize]).sum();
         }
     }
@@ -191,9 +187,9 @@ impl Csr {
         (0..self.rows()).map(of_row).collect()
     }
 
-    /// Return the diagonal entry of row i, zero if the pattern does not have it.
-    pub fn diagonal(&self, i: usize) -> f64 {
-        self.position(i, i).map_or(0.0, |k| self.values[k])
+    /// Return the diagonal, which row i has in the column `first` + i, with zeros where the pattern does not have it.
+    pub fn diagonal(&self, first: usize) -> Vec<f64> {
+        (0..self.rows()).map(|i| self.position(i, first + i).map_or(0.0, |at| self.values[at])).collect()
     }
 }
 
@@ -209,8 +205,8 @@ pub fn countable(what: &str, entries: usize) -> Result<()> {
     Err(Error::new(Kind::Solver, message).help("take a coarser mesh, or order = 1"))
 }
 
-/// Return the scalar product for a row with all columns. Its partial sums allow vector instructions.
-fn dot_of_full(a: &[f64], b: &[f64]) -> f64 {
+/// Return x'y by partial sums, which allow vector instructions.
+pub fn long_dot(a: &[f64], b: &[f64]) -> f64 {
     const WIDE: usize = 8;
     let (a, b) = (a.chunks_exact(WIDE), b.chunks_exact(WIDE));
     let rest = dot(a.remainder(), b.remainder());

@@ -3,11 +3,11 @@
 use super::Motion;
 use super::dofs::{Distribution, Dofs};
 use crate::error::{Error, Kind, Result};
-use crate::fem::ElasticBody;
+use crate::fem::Loads;
 use crate::fem::assemble::InitialLoad;
 use crate::file::available_memory;
 use crate::linalg::{Csr, dot};
-use crate::petsc::{Rows, Schur, Session};
+use crate::petsc::{Schur, Session};
 use crate::solver::options::Chosen;
 use crate::solver::{BodyCounts, Dense, InterfaceDofs, MakeSolver, SolveOutcome, SpringMatrix, rows_of};
 use std::cell::RefCell;
@@ -32,22 +32,26 @@ pub struct Energy {
 /// whole body. Solves may be inexact, but [`Body::residual`] is exact. Errors are failures of the solver library.
 pub struct Body {
     dofs: Dofs,
-    /// K and the loads. K is empty if a solver stores it, or if it was given away.
-    elastic: ElasticBody,
-    /// The diagonal of K, if K itself is in a solver or was given away; else empty.
+    loads: Loads,
+    /// The diagonal of K.
     diagonal: Vec<f64>,
-    /// G, which is made when something is first solved. A body that is only measured, or joined with others, needs
-    /// none.
-    matrix: Option<SpringMatrix>,
-    /// The function that makes the solver of G; `None` once it was used.
-    make: Option<MakeSolver>,
-    /// Whether K stays here when a solver is made of it.
-    keeps_stiffness: bool,
+    stiffness: Stiffness,
     /// Description of the solver to be made, for reports.
     words: String,
     /// Counters of the body that it replaces in a history.
     earlier: BodyCounts,
     interior: Option<Interior>,
+}
+
+/// The place of the stiffness matrix K of a body, which is stored once.
+enum Stiffness {
+    /// The matrix of all bodies has it.
+    Joint,
+    /// It waits for the solver that this function makes of it. Before that, a body that is to be condensed eliminates
+    /// its interior from it.
+    Waiting(Csr, MakeSolver),
+    /// The solver of the body has it in G.
+    Subdomain(SpringMatrix),
 }
 
 /// The interior of a condensed body.
@@ -58,8 +62,8 @@ struct Interior {
     /// Number of dofs of a node.
     dimension: usize,
     interface: InterfaceDofs,
-    /// The loads on all dofs of the body, and K until it is eliminated.
-    whole: ElasticBody,
+    /// The loads on all dofs of the body.
+    whole: Loads,
     /// The factor, once the interior is eliminated.
     schur: Option<RefCell<Schur>>,
     /// Eliminations in this run: none if one of an earlier run serves.
@@ -69,25 +73,32 @@ struct Interior {
 }
 
 impl Body {
-    /// Join a body, whose K has a pattern that holds that of B'B, its contact rows B (columns: its dofs, none of them
-    /// prescribed), and the rigid motions `unconstrained_modes` that its supports and springs leave, one vector over
-    /// the dofs each. `make` makes a solver of K when something is first solved, and `words` describe that solver.
+    /// Return a body with its contact rows B (columns: its dofs, none of them prescribed) and the rigid motions
+    /// `unconstrained_modes` that its supports and springs leave, one vector over the dofs each. `stiffness` is its K,
+    /// with a pattern that holds that of B'B, which goes to the matrix of all bodies. `words` describe the solver.
     ///
     /// A distributed body has the dofs that this rank owns, while `rows` and `unconstrained_modes` have those of its
     /// owned and ghost nodes. If the body gets a matrix of its own, that is distributed over all ranks.
     pub fn new(
-        mut elastic: ElasticBody,
+        stiffness: &Csr,
+        mut loads: Loads,
         rows: Csr,
         unconstrained_modes: Vec<Vec<f64>>,
         distribution: Option<Distribution>,
-        make: MakeSolver,
         words: String,
     ) -> Self {
-        let prescribed = std::mem::take(&mut elastic.prescribed);
-        let dofs = Dofs::new(elastic.load.len(), prescribed, rows, unconstrained_modes, distribution.map(Rc::new));
-        let (diagonal, make) = (Vec::new(), Some(make));
+        let prescribed = std::mem::take(&mut loads.prescribed);
+        let first = distribution.as_ref().map_or(0, |distribution| distribution.first);
+        let dofs = Dofs::new(loads.load.len(), prescribed, rows, unconstrained_modes, distribution.map(Rc::new));
+        let diagonal = stiffness.diagonal(first);
         let earlier = BodyCounts::default();
-        Self { dofs, elastic, diagonal, matrix: None, make, keeps_stiffness: false, words, earlier, interior: None }
+        Self { dofs, loads, diagonal, stiffness: Stiffness::Joint, words, earlier, interior: None }
+    }
+
+    /// Return the body with a solver of its own, which `make` makes of its K when something is first solved.
+    #[must_use]
+    pub fn with_solver(self, stiffness: Csr, make: MakeSolver) -> Self {
+        Self { stiffness: Stiffness::Waiting(stiffness, make), ..self }
     }
 
     /// Return a rigid part, whose dofs are the amounts of its `motions`, without a stiffness.
@@ -96,22 +107,20 @@ impl Body {
         let mut rows = Csr::new(count);
         (0..points).for_each(|q| rows.push_row(motions.iter().map(|motion| motion.trace[q]).enumerate()));
         let unit = |k: usize| (0..count).map(|i| f64::from(u8::from(i == k))).collect();
-        let elastic = ElasticBody {
-            stiffness: Csr::full(count, vec![0.0; count * count]),
-            load: motions.iter().map(|motion| motion.work).collect(),
-            ..ElasticBody::default()
-        };
-        let make: MakeSolver = Box::new(|stiffness: Rows| Ok(Box::new(Dense::new(stiffness))));
-        let body = Self::new(elastic, rows, (0..count).map(unit).collect(), None, make, "rigid".to_owned());
-        Self { keeps_stiffness: true, ..body }
+        let loads = Loads { load: motions.iter().map(|motion| motion.work).collect(), ..Loads::default() };
+        let stiffness = Csr::full(count, vec![0.0; count * count]);
+        let body = Self::new(&stiffness, loads, rows, (0..count).map(unit).collect(), None, "rigid".to_owned());
+        body.with_solver(stiffness, Box::new(Dense::make))
     }
 
-    /// Return a body that is to be condensed to its interface dofs. `whole` and `unconstrained_modes` are on all dofs.
+    /// Return a body that is to be condensed to its interface dofs. `stiffness`, `whole` and `unconstrained_modes` are
+    /// on all dofs.
     pub fn to_condense(
         session: Session,
         chosen: Chosen,
         dimension: usize,
-        whole: ElasticBody,
+        stiffness: Csr,
+        whole: Loads,
         unconstrained_modes: &[Vec<f64>],
         interface: InterfaceDofs,
     ) -> Self {
@@ -120,12 +129,10 @@ impl Body {
         let dofs = Dofs::new(interface.dofs.len(), Vec::new(), interface.rows.clone(), modes, None);
         let words = interface.in_words();
         let interior =
-            Interior { session, chosen, dimension, interface, whole, schur: None, eliminations: 0, seconds: 0.0 };
-        let make: MakeSolver = Box::new(|stiffness: Rows| Ok(Box::new(Dense::new(stiffness))));
-        let (elastic, diagonal) = (ElasticBody::default(), Vec::new());
-        let (make, interior) = (Some(make), Some(interior));
-        let earlier = BodyCounts::default();
-        Self { dofs, elastic, diagonal, matrix: None, make, keeps_stiffness: true, words, earlier, interior }
+            Some(Interior { session, chosen, dimension, interface, whole, schur: None, eliminations: 0, seconds: 0.0 });
+        let stiffness = Stiffness::Waiting(stiffness, Box::new(Dense::make));
+        let (loads, diagonal, earlier) = (Loads::default(), Vec::new(), BodyCounts::default());
+        Self { dofs, loads, diagonal, stiffness, words, earlier, interior }
     }
 
     /// Eliminate the interior, if the body is to be condensed and is not yet.
@@ -133,15 +140,18 @@ impl Body {
     /// # Errors
     /// Failures of MUMPS, and a factorisation that needs more memory than is free.
     pub fn condense(&mut self) -> Result<()> {
-        if let Some(interior) = self.interior.as_mut().filter(|interior| interior.schur.is_none()) {
-            self.elastic = interior.eliminate()?;
+        let Some(interior) = self.interior.as_mut().filter(|interior| interior.schur.is_none()) else { return Ok(()) };
+        if let Stiffness::Waiting(whole, make) = std::mem::replace(&mut self.stiffness, Stiffness::Joint) {
+            let schur = interior.eliminate(whole)?;
+            (self.loads, self.diagonal) = (interior.loads()?, schur.diagonal(0));
+            self.stiffness = Stiffness::Subdomain(self.solver(schur, make)?);
         }
         Ok(())
     }
 
-    /// Return whether the solver of G was made.
-    pub fn has_solver(&self) -> bool {
-        self.matrix.is_some()
+    /// Return whether the solver of G was set up.
+    pub fn is_set_up(&self) -> bool {
+        matches!(&self.stiffness, Stiffness::Subdomain(matrix) if matrix.is_set_up())
     }
 
     /// Return the dofs.
@@ -152,7 +162,7 @@ impl Body {
     /// Compute the equilibrium residual (26) r = f - K u - B' force, with `product` = K u and `force` = omega p at each
     /// row. Return the energies of u.
     pub fn residual(&self, u: &[f64], product: &[f64], force: &[f64], r: &mut [f64]) -> Energy {
-        let ElasticBody { load, lifting, strain_constant, energy_constant, .. } = &self.elastic;
+        let Loads { load, lifting, strain_constant, energy_constant, .. } = &self.loads;
         for (r, (load, product)) in r.iter_mut().zip(load.iter().zip(product)) {
             *r = load - product;
         }
@@ -167,11 +177,7 @@ impl Body {
     /// Return the squared energy norm of forces r at the dofs, taken for each dof alone: r'D^-1 r with the diagonal D
     /// of K + B' diag(`springs`) B, for `springs` at each row.
     pub fn unbalanced(&self, r: &[f64], springs: &[f64]) -> f64 {
-        let mut diagonal = if self.diagonal.is_empty() {
-            (0..self.dofs.count).map(|i| self.elastic.stiffness.diagonal(i)).collect()
-        } else {
-            self.diagonal.clone()
-        };
+        let mut diagonal = self.diagonal.clone();
         for (q, spring) in springs.iter().enumerate().filter(|(_, spring)| **spring > 0.0) {
             self.dofs.rows.row(q).for_each(|(i, b)| diagonal[i] += spring * b * b);
         }
@@ -179,57 +185,52 @@ impl Body {
         r.iter().zip(&diagonal).map(squared).sum()
     }
 
-    /// Return K on the dofs; it is empty if the inner solver stores K, or if it was given away.
-    pub fn stiffness(&self) -> &Csr {
-        &self.elastic.stiffness
-    }
-
-    /// Compute y = K u, for a body that has not given its K away.
-    pub fn apply_stiffness(&mut self, u: &[f64], y: &mut [f64]) {
-        match &mut self.matrix {
-            Some(matrix) if self.elastic.stiffness.rows() == 0 => {
-                matrix.multiply_stiffness(self.dofs.matrix_rows(), u, y)
-            }
-            _ => self.elastic.stiffness.multiply(u, y),
+    /// Return K of a condensed body, all entries row by row.
+    pub fn condensed_stiffness(&self) -> Option<Vec<f64>> {
+        match &self.stiffness {
+            Stiffness::Subdomain(matrix) if self.interior.is_some() => Some(matrix.stiffness()),
+            _ => None,
         }
     }
 
-    /// Give K away to a matrix of all bodies, and keep its diagonal. Return `None` if the body needs it itself.
-    pub fn give_stiffness(&mut self) -> Option<Csr> {
-        (self.matrix.is_none() && self.interior.is_none()).then(|| self.take_stiffness())
+    /// Compute y = K u, for a body whose K the matrix of all bodies does not have.
+    pub fn apply_stiffness(&mut self, u: &[f64], y: &mut [f64]) {
+        match &mut self.stiffness {
+            Stiffness::Subdomain(matrix) => matrix.multiply_stiffness(self.dofs.matrix_rows(), u, y),
+            Stiffness::Waiting(stiffness, _) => stiffness.multiply(u, y),
+            Stiffness::Joint => unreachable!("the step with the matrix of all bodies multiplies by it"),
+        }
     }
 
-    fn take_stiffness(&mut self) -> Csr {
-        let k = std::mem::replace(&mut self.elastic.stiffness, Csr::new(0));
-        let first = self.dofs.distribution.as_ref().map_or(0, |distribution| distribution.first);
-        let diagonal = |i: usize| k.position(i, first + i).map_or(0.0, |at| k.values[at]);
-        self.diagonal = (0..k.rows()).map(diagonal).collect();
-        k
+    /// Make G of K and the solver of G.
+    fn solver(&self, stiffness: Csr, make: MakeSolver) -> Result<SpringMatrix> {
+        let square = |q: usize| self.dofs.rows.row(q).map(|(i, b)| b * b * self.diagonal[i]).sum();
+        let mut row_stiffness: Vec<f64> = (0..self.dofs.rows.rows()).map(square).collect();
+        if let Some(distribution) = &self.dofs.distribution {
+            distribution.exchange.sum(&mut row_stiffness);
+        }
+        let start = self.dofs.distribution.as_ref().map(|distribution| distribution.start);
+        SpringMatrix::new(rows_of(stiffness, start)?, self.dofs.matrix_rows(), row_stiffness, None, make)
     }
 
     /// Return G, which is made of K first if it does not exist.
     fn spring_matrix(&mut self) -> Result<&mut SpringMatrix> {
-        if let Some(make) = self.make.take() {
-            let stiffness = if self.keeps_stiffness { self.elastic.stiffness.clone() } else { self.take_stiffness() };
-            let diagonal = |i: usize| self.diagonal.get(i).map_or_else(|| stiffness.diagonal(i), |value| *value);
-            let square = |q: usize| self.dofs.rows.row(q).map(|(i, b)| b * b * diagonal(i)).sum();
-            let mut row_stiffness: Vec<f64> = (0..self.dofs.rows.rows()).map(square).collect();
-            if let Some(distribution) = &self.dofs.distribution {
-                distribution.exchange.sum(&mut row_stiffness);
-            }
-            let start = self.dofs.distribution.as_ref().map(|distribution| distribution.start);
-            let rows = self.dofs.matrix_rows();
-            self.matrix = Some(SpringMatrix::new(rows_of(stiffness, start)?, rows, row_stiffness, None, make)?);
+        self.stiffness = match std::mem::replace(&mut self.stiffness, Stiffness::Joint) {
+            Stiffness::Waiting(stiffness, make) => Stiffness::Subdomain(self.solver(stiffness, make)?),
+            known => known,
+        };
+        match &mut self.stiffness {
+            Stiffness::Subdomain(matrix) => Ok(matrix),
+            _ => Err(Error::new(Kind::Solver, "an inner solver could not be made")),
         }
-        self.matrix.as_mut().ok_or_else(|| Error::new(Kind::Solver, "an inner solver could not be made"))
     }
 
     /// Form the Robin matrix G = K + B' diag(weight) B (37)-(38), with `weight` = omega psi kappa at each row. Nothing
     /// happens if the weights are those of the last call.
     pub fn robin(&mut self, weight: &[f64]) -> Result<()> {
         self.spring_matrix()?;
-        let rows = self.dofs.matrix_rows();
-        self.matrix.as_mut().map_or(Ok(()), |matrix| matrix.update(rows, weight))
+        let Self { dofs, stiffness: Stiffness::Subdomain(matrix), .. } = self else { return Ok(()) };
+        matrix.update(dofs.matrix_rows(), weight)
     }
 
     /// Factor G, or set up its preconditioner, if that has not been done since G changed.
@@ -272,7 +273,10 @@ impl Body {
 
     /// Return the counters of the work so far.
     pub fn counts(&self) -> BodyCounts {
-        let counts = self.matrix.as_ref().map_or_else(BodyCounts::default, SpringMatrix::counts);
+        let counts = match &self.stiffness {
+            Stiffness::Subdomain(matrix) => matrix.counts(),
+            _ => BodyCounts::default(),
+        };
         let mut all = self.interior.as_ref().map_or(counts, |interior| interior.count(counts));
         all += self.earlier;
         all
@@ -287,45 +291,46 @@ impl Body {
     pub fn begin_anew(&mut self) {
         self.earlier = BodyCounts::default();
         self.interior.iter_mut().for_each(|interior| interior.eliminations = 0);
-        self.matrix.iter_mut().for_each(SpringMatrix::begin_anew);
+        if let Stiffness::Subdomain(matrix) = &mut self.stiffness {
+            matrix.begin_anew();
+        }
     }
 
     /// Replace the loads f on all dofs that this rank knows, those of `initial` strains, and the values of the
     /// `prescribed` (dof, value), which are the same dofs as before. What was made of K stays.
     pub fn reload(&mut self, load: Vec<f64>, initial: &InitialLoad, prescribed: Vec<(usize, f64)>) -> Result<()> {
-        let stiffness = std::mem::take(&mut self.elastic.stiffness);
         if let Some(interior) = &mut self.interior {
             let is_same = interior.reload(load, initial, prescribed);
             if !is_same && interior.schur.is_some() {
-                self.elastic = interior.loads()?;
+                self.loads = interior.loads()?;
             }
-        } else {
-            let held = std::mem::take(&mut self.elastic.held);
-            let mut whole = ElasticBody { held, ..ElasticBody::default() };
-            whole.reload(load, initial, prescribed);
-            let own = self.dofs.distribution.as_ref().map(|distribution| distribution.restrict(&whole));
-            self.elastic = ElasticBody { held: std::mem::take(&mut whole.held), ..own.unwrap_or(whole) };
-            self.dofs.prescribed = std::mem::take(&mut self.elastic.prescribed);
+            return Ok(());
         }
-        self.elastic.stiffness = stiffness;
+        let mut loads = std::mem::take(&mut self.loads);
+        loads.reload(load, initial, prescribed);
+        self.loads = match &self.dofs.distribution {
+            Some(distribution) => distribution.restrict(loads),
+            None => loads,
+        };
+        self.dofs.prescribed = std::mem::take(&mut self.loads.prescribed);
         Ok(())
     }
 
     /// Return one line about the inner solver.
     pub fn describe(&self) -> String {
-        match &self.matrix {
-            Some(matrix) if self.interior.is_none() => matrix.solver().describe(),
+        match &self.stiffness {
+            Stiffness::Subdomain(matrix) if self.interior.is_none() => matrix.solver().describe(),
             _ => self.words.clone(),
         }
     }
 }
 
 impl Interior {
-    /// Factor the interior and return the body on its interface dofs.
-    fn eliminate(&mut self) -> Result<ElasticBody> {
+    /// Eliminate the interior from K of the whole body, and return the Schur complement on the interface dofs.
+    fn eliminate(&mut self, whole: Csr) -> Result<Csr> {
         let (began, name) = (Instant::now(), self.chosen.name());
-        let lower = self.whole.stiffness.lower_triangle();
-        self.whole.stiffness = Csr::new(0);
+        let lower = whole.lower_triangle();
+        drop(whole);
         let (dofs, interface) = (self.whole.load.len(), &self.interface.dofs);
         let controls = self.chosen.controls_of_mumps(&self.session);
         let mut schur = Schur::analyse(&self.session, &controls, self.dimension, dofs, &lower, interface)?;
@@ -339,14 +344,13 @@ impl Interior {
         schur.factor()?;
         let stiffness = Csr::full(interface.len(), schur.take_complement());
         self.schur = Some(RefCell::new(schur));
-        let body = ElasticBody { stiffness, ..self.loads()? };
         (self.eliminations, self.seconds) = (1, began.elapsed().as_secs_f64());
-        Ok(body)
+        Ok(stiffness)
     }
 
     /// Replace the loads and prescribed values of the whole body. Return whether these are the same as before.
     fn reload(&mut self, load: Vec<f64>, initial: &InitialLoad, prescribed: Vec<(usize, f64)>) -> bool {
-        let of = |whole: &ElasticBody| [whole.load.clone(), whole.lifting.clone()];
+        let of = |whole: &Loads| [whole.load.clone(), whole.lifting.clone()];
         let before = of(&self.whole);
         self.whole.reload(load, initial, prescribed);
         before == of(&self.whole)
@@ -358,10 +362,10 @@ impl Interior {
         work(&mut self.schur.as_ref().ok_or_else(missing)?.borrow_mut())
     }
 
-    /// Return the body on the interface dofs, with its loads and without K. None of these dofs is prescribed.
-    fn loads(&self) -> Result<ElasticBody> {
+    /// Return the loads on the interface dofs. None of these dofs is prescribed.
+    fn loads(&self) -> Result<Loads> {
         let Self { interface, whole, .. } = self;
-        let ElasticBody { load, lifting: whole_lifting, .. } = whole;
+        let Loads { load, lifting: whole_lifting, .. } = whole;
         let at_rest = vec![0.0; interface.dofs.len()];
         self.with_factor(|schur| {
             let lifting = if whole_lifting.is_empty() { Vec::new() } else { schur.condense(whole_lifting)? };
@@ -369,12 +373,12 @@ impl Interior {
             // displacement of the interior under the loads alone, with the interface dofs at rest
             let interior = schur.expand_condensed(load, &at_rest)?;
             let work = dot(load, &interior);
-            Ok(ElasticBody {
+            Ok(Loads {
                 load: reduced,
                 lifting,
                 energy_constant: whole.energy_constant - 0.5 * work,
                 strain_constant: whole.strain_constant + work + 2.0 * dot(whole_lifting, &interior),
-                ..ElasticBody::default()
+                ..Loads::default()
             })
         })
     }

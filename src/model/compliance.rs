@@ -48,7 +48,7 @@ pub struct ComplianceStep {
 }
 
 impl ComplianceStep {
-    /// Make the compliance of the bodies of a model, which have their K. The result is `None` where it does not pay:
+    /// Make the compliance of the condensed bodies of a model. The result is `None` where it does not pay:
     /// for one body, which has as many points as dofs. It is also `None` for bodies on springs to the ground, whose
     /// compliance has few digits of the strains if the springs are soft, and where some K is not positive definite
     /// without its pins. Collective.
@@ -162,11 +162,10 @@ impl LinearStep for ComplianceStep {
         self.factor(springs).map(|_| ())
     }
 
-    fn renew(&mut self, model: &Model) -> bool {
+    fn renew(&mut self, model: &Model) {
         // rigid parts may have other motions, and others of their motions may be free
         let before = std::mem::replace(&mut self.closings, closings(model));
         self.is_factored &= before == self.closings;
-        true
     }
 
     fn count_on(&mut self, earlier: BodyCounts) {
@@ -295,13 +294,13 @@ struct PinnedStiffness {
 impl PinnedStiffness {
     /// Invert K of a body; `None` if K without pins is not positive definite.
     fn new(body: &Body) -> Result<Option<Self>> {
-        let (stiffness, count) = (body.stiffness(), body.dofs().count);
+        let (Some(mut inverse), count) = (body.condensed_stiffness(), body.dofs().count) else { return Ok(None) };
         let pins = pins(&body.dofs().unconstrained_modes);
-        let mut inverse = vec![0.0; count * count];
-        for i in (0..count).filter(|i| !pins.contains(i)) {
-            stiffness.row(i).filter(|(j, _)| !pins.contains(j)).for_each(|(j, k)| inverse[i * count + j] = k);
+        for &pin in &pins {
+            inverse[pin * count..][..count].fill(0.0);
+            inverse.iter_mut().skip(pin).step_by(count).for_each(|k| *k = 0.0);
+            inverse[pin * count + pin] = 1.0;
         }
-        pins.iter().for_each(|&pin| inverse[pin * count + pin] = 1.0);
         if !cholesky(&mut inverse, count)? {
             return Ok(None);
         }

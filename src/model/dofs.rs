@@ -2,7 +2,7 @@
 //! and how its dofs are distributed over the ranks.
 
 use crate::exchange::{Exchange, Serial, all_gather};
-use crate::fem::ElasticBody;
+use crate::fem::Loads;
 use crate::linalg::{Csr, axpy, dot};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -190,17 +190,15 @@ impl Distribution {
         known
     }
 
-    /// Return the loads and prescribed values of a body on the owned dofs, without K, from those on the dofs of owned
-    /// and ghost nodes.
-    pub fn restrict(&self, body: &ElasticBody) -> ElasticBody {
+    /// Return the loads and prescribed values of a body on the owned dofs, from those on the dofs of owned and ghost
+    /// nodes.
+    pub fn restrict(&self, loads: Loads) -> Loads {
         let place = |&(dof, u): &(usize, f64)| Some((self.owned_positions.binary_search(&(dof as u32)).ok()?, u));
-        ElasticBody {
-            load: self.of_known(&body.load),
-            prescribed: body.prescribed.iter().filter_map(place).collect(),
-            lifting: if body.lifting.is_empty() { Vec::new() } else { self.of_known(&body.lifting) },
-            energy_constant: body.energy_constant,
-            strain_constant: body.strain_constant,
-            ..ElasticBody::default()
+        Loads {
+            load: self.of_known(&loads.load),
+            prescribed: loads.prescribed.iter().filter_map(place).collect(),
+            lifting: if loads.lifting.is_empty() { Vec::new() } else { self.of_known(&loads.lifting) },
+            ..loads
         }
     }
 

@@ -18,8 +18,7 @@ use crate::linalg::{Csr, countable, dot};
 use crate::petsc::KspIterate;
 use crate::solver::{BodyCounts, MakeSolver, SpringMatrix, rows_of};
 use serde::{Deserialize, Serialize};
-use std::borrow::Cow;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 
 /// The linear step with one matrix of all bodies.
@@ -27,9 +26,10 @@ use std::ops::Range;
 /// Layers may be far softer than the rounding of K, which resists rigid motions E of a free body by that. So where a
 /// matrix is factored, some dofs of each body are *pins*, as many as it has free motions. Its displacements are v + E
 /// a, v is zero at the pins, and a stands in their place among the unknowns. Since K E = 0, the rows of K for a are
-/// zero, exactly, and a contact row has B E there. All dofs of a rigid part are pins. A matrix of complete nodes has no
-/// rigid parts: they are eliminated around it ([`RigidParts`]).
+/// zero, exactly, and a contact row has B E there. Rigid parts have no unknowns: they are eliminated around the matrix
+/// ([`RigidParts`]).
 pub struct JointStep {
+    /// K of all bodies in G.
     matrix: SpringMatrix,
     /// B of all bodies: one row [B_a B_b] for each contact point, also for those of other ranks.
     rows: Csr,
@@ -37,41 +37,39 @@ pub struct JointStep {
     offset: Vec<usize>,
     /// Pins of each body.
     pins: Vec<Vec<usize>>,
+    /// The row of K of each pin, which the matrix does not have.
+    pinned: Csr,
     /// Number of the first row that this rank owns.
     first: usize,
     /// Whether every rank has the whole matrix and some of the bodies.
     is_redundant: bool,
-    /// Whether the bodies have given their K away.
-    has_stiffness: bool,
     /// Counters of the solver that it replaces in a history.
     earlier: BodyCounts,
-    /// Traces of the motions of rigid parts that the matrix has, one list a part.
-    rigid: Vec<Vec<Vec<f64>>>,
-    /// The rigid parts that the matrix does not have, for the springs of the last solve.
+    /// The rigid parts, for the springs of the last solve.
     parts_apart: Option<RigidParts>,
 }
 
 impl JointStep {
-    /// Join the bodies of a model. `make` makes a solver of their K; with `is_dense` it gets all entries of K, row by
-    /// row.
+    /// Join the bodies of a model. The matrix takes the `stiffness` K of those of this rank that are not condensed, by
+    /// their numbers; condensed ones keep theirs. `make` makes a solver of K; with `is_dense` it gets all entries of K,
+    /// row by row.
     ///
-    /// With `of_nodes` the bodies give their K away, and the unknowns are the displacements of nodes, as multigrid and
-    /// distributed bodies need them. Otherwise there are pins, and every rank has the whole matrix. Collective.
+    /// With `of_nodes` the unknowns are the displacements of nodes, as multigrid and distributed bodies need them.
+    /// Otherwise there are pins, and every rank has the whole matrix. Collective.
     ///
     /// # Errors
-    /// More entries than 32 bits can count, a body that needs its K, and failures of the solver library.
-    pub fn new(model: &mut Model, of_nodes: bool, is_dense: bool, make: MakeSolver) -> Result<Self> {
-        let given: Option<Vec<Csr>> = of_nodes.then(|| given(model)).transpose()?;
-        let model = &*model;
-        let parts = match given {
-            Some(given) => given.into_iter().zip(&model.bodies).map(BodyMatrices::of_nodes).collect(),
-            None => copies(model)?,
-        };
-        let layout = Layout::new(model, &parts);
+    /// More entries than 32 bits can count, a body without K, and failures of the solver library.
+    pub fn new(
+        model: &Model,
+        stiffness: BTreeMap<usize, Csr>,
+        of_nodes: bool,
+        is_dense: bool,
+        make: MakeSolver,
+    ) -> Result<Self> {
+        let layout = Layout::new(model, matrices(model, stiffness, of_nodes)?);
         let (rows, coupled) = layout.contact_rows();
-        let mut stiffness = layout.stiffness(coupled)?;
-        let Layout { offset, pins, start, .. } = layout;
-        drop(parts);
+        let (offset, pins, start) = (layout.offset.clone(), layout.pins.clone(), layout.start);
+        let (mut stiffness, pinned) = layout.stiffness(coupled)?;
         if is_dense {
             stiffness = without_zeros(&stiffness);
         }
@@ -82,9 +80,8 @@ impl JointStep {
         let row_stiffness = side_a.iter().zip(side_b).map(|(a, b)| a + b).collect();
         let matrix = SpringMatrix::new(rows_of(stiffness, start)?, &rows, row_stiffness, coarse, make)?;
         let is_redundant = !of_nodes && model.exchange.ranks() > 1;
-        let rigid = if of_nodes { Vec::new() } else { rigid_traces(model) };
-        let (has_stiffness, earlier, parts_apart) = (of_nodes, BodyCounts::default(), None);
-        Ok(Self { matrix, rows, offset, pins, first, is_redundant, has_stiffness, earlier, rigid, parts_apart })
+        let (earlier, parts_apart) = (BodyCounts::default(), None);
+        Ok(Self { matrix, rows, offset, pins, pinned, first, is_redundant, earlier, parts_apart })
     }
 
     /// Solve G x = r with the matrix until `enough` accepts an iterate. Return the estimated energy norm of the error
@@ -109,9 +106,6 @@ impl JointStep {
 
     /// Bring the rigid parts around the matrix to its springs. Return why a solver gave up, if it did.
     fn update_parts(&mut self, model: &mut Model, springs: &[f64]) -> Result<Option<Failure>> {
-        if !self.has_stiffness {
-            return Ok(None);
-        }
         let known = self.parts_apart.take();
         self.parts_apart = match RigidParts::update(known, self, model, springs)? {
             Ok(parts) => parts,
@@ -122,18 +116,57 @@ impl JointStep {
         Ok(is_free.then(|| Failure { body: None, reason: reason() }))
     }
 
+    /// Solve G x = r for the loads r of the local bodies, without rigid parts, until `enough` accepts an iterate.
+    /// Collective.
+    fn solve_around(
+        &mut self,
+        model: &Model,
+        r: &[Vec<f64>],
+        enough: &mut StoppingTest,
+    ) -> Result<Solved<LinearSolution>> {
+        let load = self.load(model, r);
+        let mut x = vec![0.0; load.len()];
+        let (last_error, failure) = match self.solve_matrix(model, &load, &mut x, enough)? {
+            Ok(last_error) => (last_error, None),
+            // other ranks may have solved the same system
+            Err(failure) if self.is_redundant => (None, Some(failure)),
+            Err(failure) => return Ok(Err(failure)),
+        };
+        let local = self.parts().zip(r).filter(|(_, r)| !r.is_empty());
+        let energy = local.map(|(part, _)| dot(&x[part.clone()], &load[part])).sum::<f64>();
+        let [displacements, apart] = self.displacements(&x, r);
+        let (field, sums) =
+            DisplacementField::of_step(model, displacements, &apart, &[energy, f64::from(u8::from(failure.is_some()))]);
+        let (energy, failures) = (sums[0], sums[1]);
+        if failures > 0.0 {
+            let elsewhere = || "the matrix of all bodies cannot be factored on another rank".to_owned();
+            return Ok(Err(failure.unwrap_or_else(|| Failure { body: None, reason: elsewhere() })));
+        }
+        let accuracy = self.matrix.solver().accuracy();
+        let error = last_error.unwrap_or(accuracy * energy.max(0.0).sqrt());
+        Ok(Ok(LinearSolution { field, energy, error, is_exact: accuracy == 0.0 }))
+    }
+
     /// Return the range of each body in a vector of all bodies.
     fn parts(&self) -> impl Iterator<Item = Range<usize>> + '_ {
         self.offset.windows(2).map(|part| part[0]..part[1])
     }
 
-    /// Return a load of the local bodies on the unknowns of the matrix; it is zero for bodies of other ranks.
+    /// Return the place of each pin in a vector of all bodies.
+    fn all_pins(&self) -> impl Iterator<Item = usize> + '_ {
+        self.offset.iter().zip(&self.pins).flat_map(|(begin, pins)| pins.iter().map(move |pin| begin + pin))
+    }
+
+    /// Return a load of the local bodies on the unknowns of the matrix. Collective.
     fn load(&self, model: &Model, r: &[Vec<f64>]) -> Vec<f64> {
         let mut load = self.whole(r);
         for (body, (r, pins)) in r.iter().zip(&self.pins).enumerate() {
             let motions =
                 model.bodies[body].local.as_ref().into_iter().flat_map(|body| &body.dofs().unconstrained_modes);
             pins.iter().zip(motions).for_each(|(pin, motion)| load[self.offset[body] + pin] = dot(motion, r));
+        }
+        if self.is_redundant {
+            model.exchange.sum(&mut load);
         }
         load
     }
@@ -161,7 +194,7 @@ impl JointStep {
     /// Return the vector of each local body from a vector of all bodies. `like` has a vector of each local body.
     fn apart(&self, x: &[f64], like: &[Vec<f64>]) -> Vec<Vec<f64>> {
         let of_body = |(part, like): (Range<usize>, &Vec<f64>)| match like.len() {
-            // a body of another rank, or a rigid part beside the matrix
+            // a body of another rank, or a rigid part
             count if count != part.len() => vec![0.0; count],
             _ => x[part].to_vec(),
         };
@@ -179,12 +212,8 @@ impl LinearStep for JointStep {
         self.matrix.set_up()
     }
 
-    fn renew(&mut self, model: &Model) -> bool {
-        if !self.has_stiffness {
-            return self.rigid == rigid_traces(model);
-        }
+    fn renew(&mut self, _model: &Model) {
         self.parts_apart = None;
-        true
     }
 
     fn count_on(&mut self, earlier: BodyCounts) {
@@ -196,63 +225,41 @@ impl LinearStep for JointStep {
         self.matrix.begin_anew();
     }
 
-    fn multiply(&mut self, model: &mut Model, v: &[Vec<f64>]) -> Vec<Vec<f64>> {
-        if !self.has_stiffness {
-            return model.multiply(v);
-        }
+    fn multiply(&mut self, _model: &mut Model, v: &[Vec<f64>]) -> Vec<Vec<f64>> {
         let x = self.whole(v);
         let mut y = vec![0.0; x.len()];
         self.matrix.multiply_stiffness(&self.rows, &x, &mut y);
+        // the matrix has zeros in the rows and columns of pins
+        let at_pins: Vec<f64> = self.all_pins().map(|pin| x[pin]).collect();
+        self.pinned.add_transpose(1.0, &at_pins, &mut y);
+        let mut products = vec![0.0; at_pins.len()];
+        self.pinned.multiply(&x, &mut products);
+        self.all_pins().zip(products).for_each(|(pin, product)| y[pin] = product);
         self.apart(&y, v)
     }
 
     fn solve(&mut self, system: System) -> Result<Solved<LinearSolution>> {
         let System { model, springs, residual, enough, .. } = system;
-        let mut r = self.load(model, residual);
-        if self.is_redundant {
-            model.exchange.sum(&mut r);
-        }
         self.matrix.update(&self.rows, springs)?;
         if let Some(failure) = self.update_parts(model, springs)? {
             return Ok(Err(failure));
         }
-        let parts = self.parts_apart.take();
-        let works = parts.as_ref().map_or(Vec::new(), |parts| parts.works(model, residual));
+        let Some(parts) = self.parts_apart.take() else { return self.solve_around(model, residual, enough) };
+        let works = parts.works(model, residual);
         let mut test = |model: &Model, trial: &Trial| {
-            let Some(parts) = &parts else { return enough(model, trial) };
             let (moved, mut closing) = (parts.moved(&works, trial.closing), trial.closing.to_vec());
             parts.close(&moved.amounts, &mut closing);
             let (energy, error) = (trial.energy + moved.energy, trial.error + moved.error);
             enough(model, &Trial { closing: &closing, energy, error })
         };
-        let mut x = vec![0.0; r.len()];
-        let (mut last_error, failure) = match self.solve_matrix(model, &r, &mut x, &mut test)? {
-            Ok(last_error) => (last_error, None),
-            Err(failure) => (None, Some(failure)),
-        };
-        if let (false, Some(failure)) = (self.is_redundant, &failure) {
-            return Ok(Err(failure.clone()));
-        }
-        let local = self.parts().zip(residual).filter(|(_, r)| !r.is_empty());
-        let energy = local.map(|(part, _)| dot(&x[part.clone()], &r[part])).sum::<f64>();
-        let [displacements, apart] = self.displacements(&x, residual);
-        let (mut field, sums) =
-            DisplacementField::of_step(model, displacements, &apart, &[energy, f64::from(u8::from(failure.is_some()))]);
-        let (mut energy, failures) = (sums[0], sums[1]);
-        if failures > 0.0 {
-            let elsewhere = || "the matrix of all bodies cannot be factored on another rank".to_owned();
-            return Ok(Err(failure.unwrap_or_else(|| Failure { body: None, reason: elsewhere() })));
-        }
-        if let Some(parts) = &parts {
+        let mut solved = self.solve_around(model, residual, &mut test)?;
+        if let Ok(LinearSolution { field, energy, error, .. }) = &mut solved {
             let moved = parts.moved(&works, &field.closing());
-            parts.add_to(&moved.amounts, &mut field);
-            energy += moved.energy;
-            last_error = last_error.map(|error| error + moved.error);
+            parts.add_to(&moved.amounts, field);
+            (*energy, *error) = (*energy + moved.energy, *error + moved.error);
+            self.parts_apart = Some(parts);
         }
-        self.parts_apart = parts;
-        let accuracy = self.matrix.solver().accuracy();
-        let error = last_error.unwrap_or(accuracy * energy.max(0.0).sqrt());
-        Ok(Ok(LinearSolution { field, energy, error, is_exact: accuracy == 0.0 }))
+        Ok(solved)
     }
 
     fn counts(&self) -> BodyCounts {
@@ -268,7 +275,7 @@ impl LinearStep for JointStep {
 
 impl WithoutRigidParts for JointStep {
     fn is_apart(&self, _model: &Model, _body: usize) -> bool {
-        self.has_stiffness
+        true
     }
 
     fn closings(&self, _model: &Model, trace: &[f64]) -> Vec<f64> {
@@ -287,28 +294,17 @@ impl WithoutRigidParts for JointStep {
         let held = x.closing().into_iter().zip(self.matrix.springs()).map(|(closing, spring)| closing * spring);
         let left: Vec<f64> = force.iter().zip(held).map(|(force, held)| force - held).collect();
         add_forces(model, &left, &mut rest);
-        let (known, load) = (dot(force, &x.closing()), self.load(model, &rest));
-        let mut change = vec![0.0; load.len()];
+        let known = dot(force, &x.closing());
         let mut enough = |_: &Model, trial: &Trial| trial.error <= ACCURACY * (known + trial.energy).sqrt();
-        let last_error = match self.solve_matrix(model, &load, &mut change, &mut enough)? {
-            Ok(last_error) => last_error,
-            Err(failure) => return Ok(Err(failure)),
-        };
-        let [displacements, apart] = self.displacements(&change, &rest);
-        x.add(1.0, &DisplacementField::of_step(model, displacements, &apart, &[]).0);
-        let energy = dot(force, &x.closing());
-        Ok(Ok((x, last_error.unwrap_or(self.matrix.solver().accuracy() * energy.max(0.0).sqrt()))))
+        Ok(self.solve_around(model, &rest, &mut enough)?.map(|change| {
+            x.add(1.0, &change.field);
+            (x, change.error)
+        }))
     }
 
     fn multiply_bodies(&mut self, model: &mut Model, v: &[Vec<f64>]) -> Vec<Vec<f64>> {
         self.multiply(model, v)
     }
-}
-
-/// Return the traces of the motions of all rigid parts, one list a part.
-fn rigid_traces(model: &Model) -> Vec<Vec<Vec<f64>>> {
-    let of_part = |slot: &BodySlot| slot.motions.iter().map(|motion| motion.trace.clone()).collect();
-    model.bodies.iter().filter(|slot| slot.is_rigid).map(of_part).collect()
 }
 
 /// Return B x at the points, n, and x'r, the squared energy norm of an iterate x. `x` and `r` have the rows of this
@@ -343,60 +339,40 @@ fn without_zeros(matrix: &Csr) -> Csr {
 
 /// The matrices of a body.
 #[derive(Serialize, Deserialize)]
-struct BodyMatrices<'a> {
-    stiffness: Cow<'a, Csr>,
+struct BodyMatrices {
+    stiffness: Csr,
     /// B.
-    rows: Cow<'a, Csr>,
+    rows: Csr,
     /// E, if amounts of motions are to stand in the place of pins.
-    modes: Cow<'a, [Vec<f64>]>,
+    modes: Vec<Vec<f64>>,
 }
 
-impl<'a> BodyMatrices<'a> {
-    fn of_nodes((stiffness, slot): (Csr, &'a BodySlot)) -> Self {
-        if slot.is_rigid {
-            return Self::without_dofs(slot);
-        }
-        let rows = slot.local.as_ref().map_or_else(Cow::default, |body| Cow::Borrowed(&body.dofs().rows));
-        Self { stiffness: Cow::Owned(stiffness), rows, modes: Cow::Borrowed(&[]) }
-    }
-
-    /// Return the matrices of a rigid part that has no unknown in the matrix.
-    fn without_dofs(slot: &BodySlot) -> Self {
+/// Return the matrices of all bodies. `stiffness` has K of those of this rank that are not condensed. Bodies that are
+/// not distributed go to all ranks, in one message.
+fn matrices(model: &Model, mut stiffness: BTreeMap<usize, Csr>, of_nodes: bool) -> Result<Vec<BodyMatrices>> {
+    let of_body = |(index, slot): (usize, &BodySlot)| {
+        let body = slot.local.as_ref().filter(|_| !slot.is_rigid)?;
+        let Dofs { count, rows, unconstrained_modes, .. } = body.dofs();
+        let condensed = || Some(Csr::full(*count, body.condensed_stiffness().filter(|_| !of_nodes)?));
+        let stiffness = stiffness.remove(&index).or_else(condensed)?;
+        let modes = if of_nodes { Vec::new() } else { unconstrained_modes.clone() };
+        Some(BodyMatrices { stiffness, rows: rows.clone(), modes })
+    };
+    let mine: Vec<Option<BodyMatrices>> = model.bodies.iter().enumerate().map(of_body).collect();
+    let mut all = if of_nodes { vec![mine] } else { all_gather(&*model.exchange, mine) };
+    let of = |(index, slot): (usize, &BodySlot)| {
         let rows = Csr::without_columns(slot.row_stiffness.len());
-        Self { stiffness: Cow::Owned(Csr::new(0)), rows: Cow::Owned(rows), modes: Cow::Borrowed(&[]) }
-    }
-
-    fn copy(slot: &'a BodySlot) -> Option<Self> {
-        let body = slot.local.as_ref()?;
-        let Dofs { rows, unconstrained_modes, .. } = body.dofs();
-        let [stiffness, rows] = [body.stiffness(), rows].map(Cow::Borrowed);
-        Some(Self { stiffness, rows, modes: Cow::Borrowed(unconstrained_modes) })
-    }
-}
-
-fn no_matrices() -> Error {
-    Error::new(Kind::Solver, "a body has no matrices to be joined").help("choose newton-robin")
-}
-
-/// Return the K that each body gives away.
-fn given(model: &mut Model) -> Result<Vec<Csr>> {
-    let give =
-        |slot: &mut BodySlot| if slot.is_rigid { Some(Csr::new(0)) } else { slot.local.as_mut()?.give_stiffness() };
-    model.bodies.iter_mut().map(give).collect::<Option<_>>().ok_or_else(no_matrices)
-}
-
-/// Return the matrices of all bodies. Of several ranks each owns some of them, and sends them to all. One message.
-fn copies(model: &Model) -> Result<Vec<BodyMatrices<'_>>> {
-    let mut all = all_gather(&*model.exchange, model.bodies.iter().map(BodyMatrices::copy).collect::<Vec<_>>());
-    let rigid = |body: usize| model.bodies[body].is_rigid.then(|| BodyMatrices::without_dofs(&model.bodies[body]));
-    let of = |body: usize| all.iter_mut().find_map(|of_rank| of_rank.get_mut(body)?.take()).or_else(|| rigid(body));
-    (0..model.bodies.len()).map(of).collect::<Option<_>>().ok_or_else(no_matrices)
+        let rigid = BodyMatrices { stiffness: Csr::new(0), rows, modes: Vec::new() };
+        if slot.is_rigid { Some(rigid) } else { all.iter_mut().find_map(|of_rank| of_rank[index].take()) }
+    };
+    let missing = || Error::new(Kind::Solver, "a body has no matrices to be joined").help("choose newton-robin");
+    model.bodies.iter().enumerate().map(of).collect::<Option<_>>().ok_or_else(missing)
 }
 
 /// The places of all bodies in one matrix.
 struct Layout<'a> {
     model: &'a Model,
-    parts: &'a [BodyMatrices<'a>],
+    parts: Vec<BodyMatrices>,
     /// How each body is distributed over the ranks, if it is.
     distributions: Vec<Option<&'a Distribution>>,
     /// First row of each body on this rank, and the number of rows of this rank.
@@ -417,11 +393,11 @@ struct BodyRow {
 }
 
 impl<'a> Layout<'a> {
-    fn new(model: &'a Model, parts: &'a [BodyMatrices<'a>]) -> Self {
+    fn new(model: &'a Model, parts: Vec<BodyMatrices>) -> Self {
         let distribution = |slot: &'a BodySlot| slot.distribution();
         let distributions: Vec<_> = model.bodies.iter().map(distribution).collect();
         let mut offset = vec![0];
-        for part in parts {
+        for part in &parts {
             offset.push(offset[offset.len() - 1] + part.stiffness.rows());
         }
         let shared = distributions.iter().copied().flatten().next();
@@ -479,20 +455,23 @@ impl<'a> Layout<'a> {
         entries.into_iter().map(|(i, value)| (offset + i, value)).collect()
     }
 
-    /// Return K of all bodies, in the rows of this rank, with zeros at the `coupled` columns that K does not have.
-    fn stiffness(&self, mut coupled: HashMap<usize, Vec<i32>>) -> Result<Csr> {
-        let stored: usize = self.parts.iter().map(|part| part.stiffness.values.len()).sum();
+    /// Return K of all bodies, in the rows of this rank, with zeros at the `coupled` columns that K does not have, and
+    /// in the rows and columns of pins; and the rows of K of the pins.
+    fn stiffness(self, mut coupled: HashMap<usize, Vec<i32>>) -> Result<(Csr, Csr)> {
+        let Self { parts, offset, pins, start, total, .. } = self;
+        let stored: usize = parts.iter().map(|part| part.stiffness.values.len()).sum();
         let room = stored + coupled.values().map(Vec::len).sum::<usize>();
         countable("the matrix of all bodies together", room)?;
-        let mut stiffness = Csr { columns: self.total, ptr: vec![0], ..Csr::default() };
-        stiffness.ptr.reserve_exact(self.offset[self.parts.len()]);
+        let mut stiffness = Csr { columns: total, ptr: vec![0], ..Csr::default() };
+        stiffness.ptr.reserve_exact(offset[parts.len()]);
         stiffness.col.reserve_exact(room);
         stiffness.values.reserve_exact(room);
-        for ((&begin, part), pins) in self.offset.iter().zip(self.parts).zip(&self.pins) {
-            let own = &*part.stiffness;
+        let mut pinned = Csr::new(offset[parts.len()]);
+        // K of a body is freed before the next one is copied
+        for ((begin, BodyMatrices { stiffness: own, .. }), pins) in offset.into_iter().zip(parts).zip(&pins) {
             let is_pin = |i: usize| pins.contains(&i);
             // K of a distributed body has the columns of the whole matrix already
-            let shift = if self.start.is_some() { 0 } else { begin as i32 };
+            let shift = if start.is_some() { 0 } else { begin as i32 };
             for i in 0..own.rows() {
                 let mut columns = coupled.remove(&(begin + i)).unwrap_or_default();
                 if is_pin(i) && columns.is_empty() {
@@ -502,10 +481,11 @@ impl<'a> Layout<'a> {
                 let known = own.range(i).filter(|&k| !is_pin(i) && !is_pin(own.col[k] as usize));
                 push_merged(&mut stiffness, known.map(|k| (shift + own.col[k], own.values[k])), &columns);
             }
+            pins.iter().for_each(|&pin| pinned.push_row(own.row(pin).map(|(j, k)| (begin + j, k))));
         }
         stiffness.col.shrink_to_fit();
         stiffness.values.shrink_to_fit();
-        Ok(stiffness)
+        Ok((stiffness, pinned))
     }
 }
 

@@ -84,11 +84,8 @@ pub trait LinearStep {
         Ok(())
     }
 
-    /// Go on with a model of the same bodies, whose loads, gaps, laws and rigid parts may differ. Return whether the
-    /// solver serves it.
-    fn renew(&mut self, _model: &Model) -> bool {
-        false
-    }
+    /// Go on with a model of the same bodies, whose loads, gaps, laws and rigid parts may differ.
+    fn renew(&mut self, _model: &Model) {}
 
     /// Count on from these counters.
     fn count_on(&mut self, _earlier: BodyCounts) {}

@@ -333,7 +333,7 @@ const STIFF: f64 = 1e4;
 /// the solver or of an option then comes before the first sweep, and the extension needs no other factorisation.
 pub fn prepare(model: &mut Model) -> Result<()> {
     let bodies = model.bodies.iter_mut().filter_map(|slot| slot.local.as_mut());
-    let is_new: Vec<bool> = bodies.map(|body| !body.has_solver()).collect();
+    let is_new: Vec<bool> = bodies.map(|body| !body.is_set_up()).collect();
     model.robin(&stiff_springs(model))?;
     let bodies = model.bodies.iter_mut().filter_map(|slot| slot.local.as_mut()).zip(is_new);
     bodies.filter(|(_, is_new)| *is_new).try_for_each(|(body, _)| body.set_up())

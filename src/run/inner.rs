@@ -26,11 +26,8 @@ pub struct SolverFactory<'a> {
     asked: SolverRequest,
     /// Options that the user wrote for the solvers.
     typed: UserOptions,
-    /// Interpolation of the displacements of all bodies from linear ones, if bodies have quadratic elements and
-    /// multigrid.
-    pub interpolation: Option<Prolongation>,
-    /// Rigid motions of all bodies, on the rows of this rank in the matrix of all bodies, if its multigrid is GAMG.
-    pub near_null_space: Vec<Vec<f64>>,
+    /// What the matrix of all bodies is to be made of.
+    pub joint: JointParts,
     /// The plan, once it is made.
     pub plan: Plan,
     /// What was asked for and planned for the problem before.
@@ -39,6 +36,18 @@ pub struct SolverFactory<'a> {
     step: Option<Box<dyn LinearStep>>,
     /// Its counters.
     counts: BodyCounts,
+}
+
+/// What the matrix of all bodies is made of, on the rows of this rank.
+#[derive(Default)]
+pub struct JointParts {
+    /// K of each body that is assembled here and not condensed, by its number.
+    pub stiffness: BTreeMap<usize, Csr>,
+    /// Interpolation of the displacements of all bodies from linear ones, if bodies have quadratic elements and
+    /// multigrid.
+    pub interpolation: Option<Prolongation>,
+    /// Rigid motions of all bodies, if the multigrid is GAMG.
+    pub near_null_space: Vec<Vec<f64>>,
 }
 
 /// What was asked for, and the plan that was made.
@@ -67,8 +76,7 @@ impl<'a> SolverFactory<'a> {
             session,
             asked,
             typed,
-            interpolation: None,
-            near_null_space: Vec::new(),
+            joint: JointParts::default(),
             plan: Plan { linear: Linear::Sweeps, bodies: Vec::new(), seconds: None },
             before,
             step,
@@ -137,8 +145,8 @@ impl<'a> SolverFactory<'a> {
         self.before.as_ref().is_some_and(is_same)
     }
 
-    /// Clear the marks of bodies whose solver is another than in the problem before. Bodies that gave their K to one
-    /// matrix serve together or not at all.
+    /// Clear the marks of bodies whose solver is another than in the problem before. Bodies whose K is in one matrix
+    /// serve together or not at all.
     fn keep_solvers(&self, is_kept: &mut [bool]) {
         let Some(Solvers { plan: before, asked }) = &self.before else { return };
         let is_linear_same = self.has_same_steps();
@@ -149,14 +157,9 @@ impl<'a> SolverFactory<'a> {
             let is_same = of(&self.plan) == of(before) && has_same_dofs;
             *is_kept &= is_same && (is_linear_same || self.plan.bodies[index].preset == Preset::Condensed);
         }
-        let factors = factors(&self.asked) && self.distributed().is_empty();
-        let is_given = match self.plan.linear {
-            Linear::Multigrid => true,
-            Linear::Direct => !factors,
-            Linear::Dense | Linear::Sweeps => false,
-        };
-        if is_given && is_kept.contains(&false) {
-            is_kept.fill(false);
+        if matches!(self.plan.linear, Linear::Direct | Linear::Multigrid) && is_kept.contains(&false) {
+            let is_condensed = self.plan.bodies.iter().map(|body| body.preset == Preset::Condensed);
+            is_kept.iter_mut().zip(is_condensed).for_each(|(is_kept, is_condensed)| *is_kept &= is_condensed);
         }
     }
 
@@ -249,6 +252,29 @@ impl<'a> SolverFactory<'a> {
     }
 }
 
+impl JointParts {
+    /// Add a body with this number. If its dofs are distributed, the columns of its `interpolation` are those of all
+    /// bodies. `modes` are its rigid motions.
+    fn add(
+        &mut self,
+        body: usize,
+        stiffness: Csr,
+        interpolation: Option<Prolongation>,
+        modes: Vec<Vec<f64>>,
+        is_distributed: bool,
+    ) {
+        self.stiffness.insert(body, stiffness);
+        if let Some(next) = interpolation {
+            let whole = self.interpolation.get_or_insert_with(|| Prolongation { rows: Csr::new(0), own: 0 });
+            let first = if is_distributed { 0 } else { whole.rows.columns };
+            whole.append(&next, first);
+        }
+        // each motion moves all bodies at once: few cells do not see the difference
+        self.near_null_space.resize(modes.len(), Vec::new());
+        self.near_null_space.iter_mut().zip(modes).for_each(|(whole, mode)| whole.extend(mode));
+    }
+}
+
 /// Return whether the matrix of all bodies would be factored.
 fn factors(asked: &SolverRequest) -> bool {
     matches!(asked.whole.get("pc_type"), Some("cholesky" | "lu"))
@@ -326,7 +352,8 @@ impl Factory for SolverFactory<'_> {
         let Assembled {
             name,
             dimension,
-            body,
+            stiffness,
+            loads,
             distribution,
             rows,
             near_null_space,
@@ -334,36 +361,29 @@ impl Factory for SolverFactory<'_> {
             interpolation,
         } = assembled;
         let missing = || Error::new(Kind::Solver, format!("no solver is planned for body `{name}`"));
-        let planned = self.plan.bodies.iter_mut().find(|body| body.facts.name == name).ok_or_else(missing)?;
+        let index = self.plan.bodies.iter().position(|body| body.facts.name == name).ok_or_else(missing)?;
+        let planned = &mut self.plan.bodies[index];
         let (session, chosen) = (self.session.clone(), planned.facts.options.clone());
         if let Some(interface) = planned.interface.take() {
-            return Ok(Body::to_condense(session, chosen, dimension, body, &unconstrained_modes, interface));
+            let modes = &unconstrained_modes;
+            return Ok(Body::to_condense(session, chosen, dimension, stiffness, loads, modes, interface));
         }
         let is_swept = self.plan.linear == Linear::Sweeps;
         let words = preset::in_words(if is_swept { &chosen } else { &self.asked.whole });
-        let mut levels = interpolation;
-        if self.plan.linear == Linear::Multigrid
-            && let Some(next) = levels.take()
-        {
-            let empty = || Prolongation { rows: Csr::new(0), own: 0 };
-            let whole = self.interpolation.get_or_insert_with(empty);
-            // if dofs are distributed, the columns are those of all bodies
-            let first = if distribution.is_some() { 0 } else { whole.rows.columns };
-            whole.append(&next, first);
-        }
         let is_gamg = self.asked.whole.get("pc_type") == Some("gamg");
         let mut modes: Vec<Vec<f64>> = if is_swept || is_gamg { near_null_space() } else { Vec::new() };
         if let Some(distribution) = &distribution {
             modes.iter_mut().for_each(|mode| *mode = distribution.of_known(mode));
         }
-        if !is_swept {
-            // each motion moves all bodies at once: few cells do not see the difference
-            self.near_null_space.resize(modes.len(), Vec::new());
-            self.near_null_space.iter_mut().zip(modes.drain(..)).for_each(|(whole, mode)| whole.extend(mode));
+        let is_distributed = distribution.is_some();
+        let body = Body::new(&stiffness, loads, rows, unconstrained_modes, distribution, words);
+        if is_swept {
+            let make: MakeSolver = Box::new(move |stiffness: Rows| {
+                Ok(Box::new(Krylov::new(&session, chosen, dimension, stiffness, &modes, interpolation)?))
+            });
+            return Ok(body.with_solver(stiffness, make));
         }
-        let make: MakeSolver = Box::new(move |stiffness: Rows| {
-            Ok(Box::new(Krylov::new(&session, chosen, dimension, stiffness, &modes, levels)?))
-        });
-        Ok(Body::new(body, rows, unconstrained_modes, distribution, make, words))
+        self.joint.add(index, stiffness, interpolation, modes, is_distributed);
+        Ok(body)
     }
 }

@@ -1,7 +1,7 @@
 //! The steps from a scene to a solved problem, by the [`stages`](super::stages): mesh, discretisation, inner solvers,
 //! options, method, iteration. A problem takes over what the run of another scene before it has left.
 
-use super::inner::SolverFactory;
+use super::inner::{JointParts, SolverFactory};
 use super::meshed::{self, MeshFacts, SceneMesh};
 use super::stages::{Before, Begin, Built, Clock, Done, Prepared};
 use super::warnings;
@@ -150,8 +150,7 @@ fn build_on(
         marks,
         splits: mesh.facts().splits.clone(),
         file: mesh.facts().file.clone(),
-        interpolation: inner.interpolation.take(),
-        near_null_space: std::mem::take(&mut inner.near_null_space),
+        joint: std::mem::take(&mut inner.joint),
         choice: inner.reason(),
         options: inner.options(),
         solvers: inner.into_solvers(),
@@ -261,22 +260,21 @@ fn linear_step(session: &Session, built: &mut Built, start: &mut InitialGuess) -
         prepare_sweeps(built)?;
         return Ok(Box::new(SweepCg::new(coefficient_of(&built.scene, &built.discrete))));
     }
-    let Built { scene, discrete, step, counts, options, interpolation, near_null_space, .. } = built;
+    let Built { scene, discrete, step, counts, options, joint, .. } = built;
     let model = &mut discrete.model;
-    if let Some(mut step) = step.take()
-        && step.renew(model)
-    {
+    if let Some(mut step) = step.take() {
+        step.renew(model);
         return Ok(step);
     }
     let compliance = if linear == Linear::Dense { ComplianceStep::new(model)? } else { None };
-    let (interpolation, modes) = (interpolation.take(), std::mem::take(near_null_space));
+    let JointParts { stiffness, interpolation, near_null_space: modes } = std::mem::take(joint);
     // a factorisation alone can do without complete nodes, with unknowns for rigid motions among them, if its rows are
     // not distributed
     let is_dense = linear == Linear::Dense;
     let factors = is_dense || matches!(options[0].get("pc_type"), Some("cholesky" | "lu"));
     let of_nodes = !factors || model.is_distributed();
     let make: MakeSolver = if is_dense {
-        Box::new(|stiffness| Ok(Box::new(Dense::new(stiffness))))
+        Box::new(Dense::make)
     } else {
         let (session, chosen) = (session.clone(), options[0].clone());
         let block = if of_nodes { scene.dimension.value } else { 1 };
@@ -284,7 +282,7 @@ fn linear_step(session: &Session, built: &mut Built, start: &mut InitialGuess) -
     };
     let mut step: Box<dyn LinearStep> = match compliance {
         Some(step) => Box::new(step),
-        None => Box::new(JointStep::new(model, of_nodes, is_dense, make)?),
+        None => Box::new(JointStep::new(model, stiffness, of_nodes, is_dense, make)?),
     };
     step.count_on(*counts);
     // the first system of the paper's iteration is the extension of its start

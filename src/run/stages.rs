@@ -1,12 +1,11 @@
 //! The stages of a run, each made from the previous one: [`Scene`], [`Built`], [`Prepared`], [`Done`]; and the clock
 //! that measures its phases.
 
-use super::inner::Solvers;
+use super::inner::{JointParts, Solvers};
 use super::meshed::{MeshFile, SceneMesh};
 use crate::ddm::{InitialGuess, Method, Outcome, Row};
 use crate::discretize::{BodyInfo, Discrete};
 use crate::error::Result;
-use crate::fem::Prolongation;
 use crate::file::bytes_in_proc;
 use crate::model::{BodyCounts, LinearStep, Model};
 use crate::output::{BodyField, Mark, StepReport};
@@ -35,10 +34,8 @@ pub struct Built {
     pub step: Option<Box<dyn LinearStep>>,
     /// Counters of that solver.
     pub counts: BodyCounts,
-    /// Interpolation of all bodies from linear displacements, until multigrid takes it.
-    pub interpolation: Option<Prolongation>,
-    /// Rigid motions of all bodies for GAMG of their matrix, until it takes them.
-    pub near_null_space: Vec<Vec<f64>>,
+    /// What the matrix of all bodies is made of, until it takes that.
+    pub joint: JointParts,
     /// Reason for the choice of the inner solver, if no PETSc option was typed.
     pub choice: String,
     /// Options of all PETSc solvers of the problem: of bodies, or of the joint matrix of all bodies.

@@ -1,7 +1,8 @@
 //! Dense Cholesky factorisation by the LAPACK that PETSc uses, for matrices without zeros.
 
-use super::{Change, InnerSolver, SolveOutcome};
+use super::{Change, InnerSolver, SolveOutcome, Write};
 use crate::error::Result;
+use crate::linalg::long_dot;
 use crate::petsc::{Rows, cholesky, cholesky_solve};
 
 /// G as a dense matrix, which is factored when it is first needed after a change.
@@ -16,14 +17,26 @@ pub struct Dense {
 }
 
 impl Dense {
-    /// Start from a symmetric matrix with all entries stored.
-    pub fn new(matrix: Rows) -> Self {
+    /// Make the solver of a symmetric matrix with all entries stored.
+    pub fn make(matrix: Rows) -> Result<Box<dyn InnerSolver>> {
         let (rows, values) = (matrix.own().len(), matrix.into_values());
-        Self { rows, factor: vec![0.0; values.len()], values, made: None, factorizations: 0 }
+        Ok(Box::new(Self { rows, factor: vec![0.0; values.len()], values, made: None, factorizations: 0 }))
     }
 }
 
 impl InnerSolver for Dense {
+    fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    fn multiply(&mut self, [to_stiffness, restore]: [&Write; 2], x: &[f64], y: &mut [f64]) -> Result<()> {
+        to_stiffness(&mut self.values);
+        let rows = self.values.chunks_exact(self.rows.max(1));
+        y.iter_mut().zip(rows).for_each(|(y, row)| *y = long_dot(row, x));
+        restore(&mut self.values);
+        Ok(())
+    }
+
     fn update(&mut self, change: Change) -> Result<()> {
         (change.write)(&mut self.values);
         self.made = None;

@@ -1,7 +1,7 @@
 //! Any KSP and PC of PETSc as inner solver.
 
 use super::options::Chosen;
-use super::{Change, InnerSolver, SolveOutcome};
+use super::{Change, InnerSolver, SolveOutcome, Write};
 use crate::error::{Error, Kind, Result};
 use crate::fem::Prolongation;
 use crate::linalg::Csr;
@@ -193,8 +193,12 @@ impl Krylov {
 }
 
 impl InnerSolver for Krylov {
-    fn matrix_mut(&mut self) -> Option<&mut Matrix> {
-        Some(&mut self.matrix)
+    fn values(&self) -> &[f64] {
+        self.matrix.values()
+    }
+
+    fn multiply(&mut self, [to_stiffness, restore]: [&Write; 2], x: &[f64], y: &mut [f64]) -> Result<()> {
+        Ok(self.matrix.multiply_changed(to_stiffness, restore, x, y)?)
     }
 
     fn update(&mut self, change: Change) -> Result<()> {

@@ -23,7 +23,7 @@ pub use springs::{MakeSolver, MakeSubspace, SpringMatrix};
 
 use crate::error::Result;
 use crate::linalg::Csr;
-use crate::petsc::{ConvergenceTest, Int, Matrix, Rows, Subspace};
+use crate::petsc::{ConvergenceTest, Int, Rows, Subspace};
 use serde::{Deserialize, Serialize};
 
 /// Turn a whole matrix into PETSc's rows, or the rows of this rank, which begin with number `start`.
@@ -97,11 +97,14 @@ impl std::ops::AddAssign for BodyCounts {
     }
 }
 
+/// A function that changes the values of G.
+pub type Write<'a> = dyn Fn(&mut [f64]) + 'a;
+
 /// A change of G = K + B' diag(d) B. An iterative solver may keep the preconditioner of an earlier G and correct it by
 /// exact solves on a few dofs.
 pub struct Change<'a> {
     /// Writes the values of G, in the order of the pattern that the solver was made with.
-    pub write: &'a dyn Fn(&mut [f64]),
+    pub write: &'a Write<'a>,
     /// The contact rows B.
     pub rows: &'a Csr,
     /// Spring stiffnesses d of G, one a row of B.
@@ -112,12 +115,14 @@ pub struct Change<'a> {
     pub coarse: &'a dyn Fn() -> Option<Box<dyn Subspace>>,
 }
 
-/// An owner of the matrix G with a way to solve G z = r.
+/// An owner of the matrix G with a way to solve G z = r. Nobody else stores K, which G has but for the springs.
 pub trait InnerSolver {
-    /// Return G for products that leave it unchanged, if the solver stores it in rows. Then nobody else has to store K.
-    fn matrix_mut(&mut self) -> Option<&mut Matrix> {
-        None
-    }
+    /// Return the values of G, in the order of the pattern that the solver was made with.
+    fn values(&self) -> &[f64];
+
+    /// Compute y = K x with G. The first of `changes` turns its values into those of K, and the second one undoes that
+    /// to the last bit.
+    fn multiply(&mut self, changes: [&Write; 2], x: &[f64], y: &mut [f64]) -> Result<()>;
 
     /// Change values of G. The next solve uses the new matrix.
     fn update(&mut self, change: Change) -> Result<()>;

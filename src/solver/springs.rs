@@ -1,6 +1,6 @@
 //! The matrix G = K + B' diag(d) B of a linear system with springs d at contact points, together with its solver.
 
-use super::{BodyCounts, Change, InnerSolver, SolveOutcome};
+use super::{BodyCounts, Change, InnerSolver, SolveOutcome, Write};
 use crate::error::Result;
 use crate::linalg::Csr;
 use crate::petsc::{Rows, Subspace};
@@ -122,17 +122,26 @@ impl SpringMatrix {
         (largest > f64::EPSILON.sqrt().recip()).then_some(largest)
     }
 
-    /// Compute y = K x with G, from which the springs are taken out meanwhile. The solver must store G in rows. If
-    /// PETSc fails, y is NaN, and the run ends with that.
+    /// Return the values of K, in the order of the pattern of G.
+    pub fn stiffness(&self) -> Vec<f64> {
+        let mut values = self.solver.values().to_vec();
+        self.coupling.reset(&mut values);
+        values
+    }
+
+    /// Compute y = K x with G, from which the springs are taken out meanwhile. If PETSc fails, y is NaN, and the run
+    /// ends with that.
     pub fn multiply_stiffness(&mut self, rows: &Csr, x: &[f64], y: &mut [f64]) {
-        let (coupling, springs) = (&self.coupling, &self.springs);
-        let product = self
-            .solver
-            .matrix_mut()
-            .map(|matrix| matrix.multiply_changed(|g| coupling.reset(g), |g| coupling.write(rows, springs, g), x, y));
-        if !matches!(product, Some(Ok(()))) {
+        let Self { solver, coupling, springs, .. } = self;
+        let changes: [&Write; 2] = [&|g| coupling.reset(g), &|g| coupling.write(rows, springs, g)];
+        if solver.multiply(changes, x, y).is_err() {
             y.fill(f64::NAN);
         }
+    }
+
+    /// Return whether G was factored, or its preconditioner set up.
+    pub fn is_set_up(&self) -> bool {
+        self.solver.factorizations()[1] > 0
     }
 
     /// Return the counters since the start or the last [`Self::begin_anew`].
@@ -220,5 +229,30 @@ impl Coupling {
             let products = owned.flat_map(|(_, x)| b.iter().map(move |y| x * y));
             positions.iter().zip(products).for_each(|(&at, product)| g[at as usize] += spring * product);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Dense, rows_of};
+    use super::*;
+
+    /// The one matrix of a dense solver serves for K, for products with K, and for solves with G.
+    #[test]
+    fn springs_leave_the_stiffness_as_it_is() -> Result<()> {
+        let mut rows = Csr::new(2);
+        rows.push_row([(1, 2.0)]);
+        let stiffness = vec![3.0, -1.0, -1.0, 2.0];
+        let k = rows_of(Csr::full(2, stiffness.clone()), None)?;
+        let mut matrix = SpringMatrix::new(k, &rows, vec![8.0], None, Box::new(Dense::make))?;
+        for spring in [5.0, 0.0, 0.25] {
+            matrix.update(&rows, &[spring])?;
+            let (x, mut y, mut z) = ([1.0, 2.0], [0.0; 2], [0.0; 2]);
+            matrix.multiply_stiffness(&rows, &x, &mut y);
+            assert_eq!((y, matrix.stiffness()), ([1.0, 3.0], stiffness.clone()));
+            matrix.apply(|solver| solver.solve(&[1.0, 3.0 + 8.0 * spring], &mut z))?;
+            assert!(z.iter().zip(x).all(|(z, x)| (z - x).abs() < 1e-14), "{z:?}");
+        }
+        Ok(())
     }
 }
