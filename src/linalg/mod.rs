@@ -209,8 +209,8 @@ pub fn countable(what: &str, entries: usize) -> Result<()> {
     Err(Error::new(Kind::Solver, message).help("take a coarser mesh, or order = 1"))
 }
 
-/// Return the scalar product for a row with all columns. Its partial sums allow vector instructions.
-fn dot_of_full(a: &[f64], b: &[f64]) -> f64 {
+/// Return x'y of long vectors, as rows with all columns. Its partial sums allow vector instructions.
+pub fn dot_of_full(a: &[f64], b: &[f64]) -> f64 {
     const WIDE: usize = 8;
     let (a, b) = (a.chunks_exact(WIDE), b.chunks_exact(WIDE));
     let rest = dot(a.remainder(), b.remainder());
