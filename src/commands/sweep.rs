@@ -7,13 +7,15 @@ use super::rows::CaseRow;
 use super::solve::claim;
 use super::write::to_json;
 use super::{SceneArgs, Terminal, VerbosityArgs, folder_of};
-use crate::ddm::{Observer, Status};
+use crate::ddm::{InitialGuess, Observer, Outcome, Solution, Status};
+use crate::discretize::Discrete;
 use crate::error::{Error, Kind, Result};
 use crate::interrupt::Interrupt;
 use crate::output::tables::{self, Cell, HistoryWriter};
 use crate::output::{Folder, LISTED, Report, ResultNames, RowFile, busiest, say, terminal};
 use crate::parallel::collectively;
 use crate::petsc::Session;
+use crate::problem::{MethodName, MethodSpec, Start};
 use crate::run::{self, Begin, Clock, Done, Prepared, report, results, verdict};
 use crate::scene::Scene;
 use indicatif::ProgressBar;
@@ -80,8 +82,7 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &SweepArgs) -> R
     for (case, scene) in plan.cases.iter().zip(&scenes) {
         let mut clock = Clock::default();
         sweep.bar.set_message(case.label.clone());
-        let ready = sweep.prepare(case, scene, before.take(), &mut clock)?;
-        let mut done = run::iterate(ready, interrupt, &mut requests, &mut clock)?;
+        let mut done = sweep.solve(case, scene, before.take(), &mut requests, &mut clock)?;
         let estimate = run::estimate(&mut done, &mut clock)?;
         clock.total();
         let report = report::report(session, &done, &results::recover(&done), estimate.as_ref(), &clock);
@@ -150,14 +151,49 @@ struct Sweep<'a> {
 }
 
 impl Sweep<'_> {
-    /// Build the problem of a run, with what the run before has left, and set up its method. Collective.
-    fn prepare(&mut self, case: &Case, scene: &Rc<Scene>, before: Option<Done>, clock: &mut Clock) -> Result<Prepared> {
+    /// Solve the problem of a run, from the pressures of the run before where this may save steps, and from its own
+    /// start if there is no solution from there. Collective.
+    fn solve(
+        &mut self,
+        case: &Case,
+        scene: &Rc<Scene>,
+        before: Option<Done>,
+        requests: &mut Interrupt,
+        clock: &mut Clock,
+    ) -> Result<Done> {
+        let near = before.as_ref().and_then(|before| pressures(before, scene));
+        let is_near = near.is_some();
+        let ready = self.prepare(case, scene, before, near, clock)?;
+        let done = run::iterate(ready, self.interrupt, requests, clock)?;
+        let status = &done.outcome.status;
+        if !is_near || status.is_solved() || matches!(status, Status::Interrupted { .. }) {
+            return Ok(done);
+        }
+        let ready = self.prepare(case, scene, Some(done), None, clock)?;
+        run::iterate(ready, self.interrupt, requests, clock)
+    }
+
+    /// Build the problem of a run, with what the run before has left, and set up its method, with these pressures of
+    /// the run before if it has the same contact points. Collective.
+    fn prepare(
+        &mut self,
+        case: &Case,
+        scene: &Rc<Scene>,
+        before: Option<Done>,
+        pressures: Option<Vec<f64>>,
+        clock: &mut Clock,
+    ) -> Result<Prepared> {
         let session = self.session;
         let built = run::build_after(session, scene.clone(), before, self.interrupt, clock)?;
         let own = results::names_of_results(&built);
         let is_same = *self.names.get_or_insert_with(|| own.clone()) == own;
         collectively(session, if is_same { Ok(()) } else { Err(other_columns(&case.label)) })?;
-        let ready = run::set_up(session, built, Begin::default(), clock)?;
+        let Discrete { model, is_renewed, .. } = &built.discrete;
+        let start = pressures.filter(|p| *is_renewed && p.len() == model.points()).map(|pressures| {
+            let compression = model.compressions_of(&pressures);
+            InitialGuess::Known(Box::new(Solution { compression, ..Solution::default() }))
+        });
+        let ready = run::set_up(session, built, Begin { start, ..Begin::default() }, clock)?;
         if session.rank() == 0 && self.table.is_none() {
             // before anything is computed that could be lost
             self.folder.clear()?;
@@ -220,6 +256,18 @@ fn result_fields(report: &Report, names: &ResultNames) -> Vec<Cell> {
     fields.extend(pairs().flat_map(|(pair, name)| names.of_run(&pair.result, name)));
     fields.extend(names.reactions(&results::reported(&report.bodies)));
     fields
+}
+
+/// Return the pressures of the run before, if Newton's method may start from them: where the scene has no start of its
+/// own, and the same method and solver, so that the iterations of methods and solvers can be compared.
+fn pressures(before: &Done, scene: &Scene) -> Option<Vec<f64>> {
+    let MethodSpec { name, start, steps, .. } = &scene.method;
+    let is_newton = !matches!(name, MethodName::Robin | MethodName::Semismooth);
+    let is_free = is_newton && matches!(start, Start::Auto) && steps.is_empty();
+    let [earlier, settings] = [&before.built.scene, scene].map(Scene::settings);
+    let is_same = ["method", "solver"].iter().all(|key| earlier[key] == settings[key]);
+    let Outcome { status, layer, .. } = &before.outcome;
+    (is_free && is_same && status.is_solved()).then(|| layer.pressure.clone())
 }
 
 /// Return the refusal of a run, named by its label, whose row would have other columns than those before.

@@ -181,8 +181,7 @@ fn part(
         (pair.rows[1], pair.nodal[1]) = (Csr::without_columns(pair.len()), Csr::without_columns(pair.len()));
         return Ok(Some(BodySlot::rigid(&spec.between[1].value, number, pair.len(), motions)));
     }
-    let preload = spec.preload.map(|preload| spec.factor * preload);
-    let Some(force) = spec.force().or(preload) else { return Ok(None) };
+    let Some(force) = spec.force().or(spec.preload) else { return Ok(None) };
     let pulls = spec.bond && spec.preload.is_some() && !is_through;
     let work = if pulls { -force } else { force };
     let motion = Motion { name: "offset".to_owned(), trace: vec![1.0; pair.len()], work };

@@ -20,7 +20,7 @@ use super::motions::Motions;
 use super::{Body, BodySlot, DisplacementField, Model};
 use crate::error::{Error, Kind, Result};
 use crate::exchange::{Exchange, broadcast};
-use crate::linalg::{axpy, dot};
+use crate::linalg::{axpy, dot, long_dot};
 use crate::petsc::{cholesky, cholesky_inverse, cholesky_solve};
 use crate::solver::BodyCounts;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
@@ -312,7 +312,7 @@ impl PinnedStiffness {
     fn solve(&self, r: &[f64]) -> Vec<f64> {
         let mut forces = r.to_vec();
         self.pins.iter().for_each(|&pin| forces[pin] = 0.0);
-        self.inverse.chunks_exact(self.count.max(1)).map(|row| dot(row, &forces)).collect()
+        self.inverse.chunks_exact(self.count.max(1)).map(|row| long_dot(row, &forces)).collect()
     }
 
     /// Add B K^-1 B' to F, n x n, for the contact rows of the body at these points.
@@ -350,11 +350,13 @@ impl SpringSystem {
         let count = springs.len();
         let points: Vec<usize> = (0..count).filter(|&q| has_spring(springs[q])).collect();
         let m = points.len();
-        let mut factor = Vec::with_capacity(m * m);
-        for &q in &points {
-            factor.extend(points.iter().map(|&p| compliance[q * count + p]));
+        let mut factor = vec![0.0; m * m];
+        for (i, &q) in points.iter().enumerate() {
+            // the factorisation reads the entries up to the diagonal
+            let row = &mut factor[i * m..][..=i];
+            row.iter_mut().zip(&points).for_each(|(entry, &p)| *entry = compliance[q * count + p]);
+            row[i] += springs[q].recip();
         }
-        points.iter().enumerate().for_each(|(i, &q)| factor[i * m + i] += springs[q].recip());
         let is_definite = cholesky(&mut factor, m)?;
         let motions = DMatrix::from_fn(m, closings.len(), |i, k| closings[k][points[i]]);
         let mut following = motions.clone();

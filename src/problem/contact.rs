@@ -5,7 +5,6 @@ use super::check::{Check, Fault, positive};
 use super::compile::{Compile, Names, compile};
 use super::geometry::{Geometry, Plane};
 use super::layer::{LayerSpec, UnloadSpec};
-use super::load::one;
 use super::pattern;
 use super::read::{Either, Form, OneOrVector, Vector, check_numbers, refused, some_table, table};
 use crate::error::{Error, Located, Result as Checked, shown};
@@ -119,9 +118,18 @@ pub struct ContactSpec {
     /// Direction of the slip, for a pair that is the shear of a bond.
     #[serde(skip)]
     pub slip: Option<Slip>,
-    /// Factor of forces and motions at the present load step; 1 without load steps.
-    #[serde(skip, default = "one")]
-    pub factor: f64,
+}
+
+/// What the first surface of a contact faces. Many keys mean something only with some of them
+/// ([`ContactSpec::check_keys`]).
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Partner {
+    /// A second surface, which the scene names.
+    Surface,
+    /// The surfaces of all bodies nearby: the contact is a rule that finds pairs.
+    Nearby,
+    /// A rigid obstacle, which the gap alone describes.
+    Obstacle,
 }
 
 fn no_gap() -> Field {
@@ -167,7 +175,6 @@ impl ContactSpec {
             reference: None,
             table: 0,
             slip: None,
-            factor: 1.0,
         }
     }
 
@@ -241,11 +248,17 @@ impl ContactSpec {
         self.given().chain([&self.gap]).flat_map(Field::factors)
     }
 
-    /// Give its expressions the factors of a load step.
-    pub fn set_factors(&mut self, factors: &[f64]) {
+    /// Give forces and motions their values in a load step, and the gap its factors. Numbers are multiplied by the factor
+    /// of the contact's `own` path. An expression has the factors that it names, and no other.
+    pub fn set_step(&mut self, factors: &[f64], own: f64) {
         let turns = [&mut self.tilt, &mut self.moment].into_iter().flatten().flat_map(OneOrVector::fields_mut);
-        let numbers = [&mut self.approach, &mut self.force].into_iter().flatten();
-        numbers.chain(turns).chain([&mut self.gap]).for_each(|field| *field = field.in_step(factors));
+        let given = [&mut self.approach, &mut self.force].into_iter().flatten().chain(turns);
+        given.for_each(|field| match field {
+            Field::Constant(number) => *number *= own,
+            expression => *expression = expression.in_step(factors),
+        });
+        self.preload.iter_mut().for_each(|preload| *preload *= own);
+        self.gap = self.gap.in_step(factors);
     }
 
     /// Check that forces and motions are numbers in a load step.
@@ -258,32 +271,38 @@ impl ContactSpec {
 
     /// Return the approach that is given in the present load step.
     pub fn approach(&self) -> Option<f64> {
-        self.approach.as_ref().map(|field| self.in_step(field))
+        self.approach.as_ref().map(number)
     }
 
     /// Return the force that is given in the present load step.
     pub fn force(&self) -> Option<f64> {
-        self.force.as_ref().map(|field| self.in_step(field))
+        self.force.as_ref().map(number)
     }
 
     /// Return the turn that is given in the present load step.
     pub fn tilt(&self) -> Option<[f64; 3]> {
-        self.tilt.as_ref().map(|axial| axial.axial(|field| self.in_step(field)))
+        self.tilt.as_ref().map(|axial| axial.axial(number))
     }
 
     /// Return the moment that is given in the present load step.
     pub fn moment(&self) -> Option<[f64; 3]> {
-        self.moment.as_ref().map(|axial| axial.axial(|field| self.in_step(field)))
+        self.moment.as_ref().map(|axial| axial.axial(number))
     }
 
-    /// Return a force or motion in the present load step. An expression has the factors that it names, and no other.
-    fn in_step(&self, field: &Field) -> f64 {
-        if field.is_constant() { self.factor * number(field) } else { number(field) }
+    /// Return what the first surface faces.
+    fn partner(&self) -> Partner {
+        if self.obstacle || self.on.is_some() {
+            Partner::Obstacle
+        } else if self.between.iter().all(|name| name.value == AUTO) {
+            Partner::Nearby
+        } else {
+            Partner::Surface
+        }
     }
 
     /// Return whether it is a rule that finds pairs, and names no surfaces: `between = "auto"`.
     pub fn is_rule(&self) -> bool {
-        self.between.iter().all(|name| name.value == AUTO)
+        self.partner() == Partner::Nearby
     }
 }
 
@@ -320,7 +339,7 @@ pub enum Overlap {
 }
 
 compile!(ContactSpec { between, on, of, layer, tension, unload, shear, at, path, reference } else {
-    gap, approach, force, tilt, moment, distance, angle, edge, touching, bond, obstacle, preload, overlap, table, slip, factor
+    gap, approach, force, tilt, moment, distance, angle, edge, touching, bond, obstacle, preload, overlap, table, slip
 } then compile_steps);
 
 impl ContactSpec {
@@ -342,14 +361,12 @@ impl ContactSpec {
 impl Check for ContactSpec {
     /// Check all but the layer, which is checked by itself.
     fn check(&self, geometry: Geometry) -> Result<(), Fault> {
-        match (&self.on, self.obstacle) {
-            (None, false) if self.between.iter().all(|name| name.is_empty()) => {
-                return Err(Fault::new("", "[[contact]] has no `between`", "`between` is missing", EXAMPLE));
-            }
-            (None, false) if self.is_rule() => self.check_rule()?,
-            (None, false) => self.check_pair()?,
-            (on, _) => self.check_obstacle(on.as_ref())?,
+        match self.partner() {
+            Partner::Surface => self.check_pair()?,
+            Partner::Nearby => self.check_rule()?,
+            Partner::Obstacle => self.check_obstacle()?,
         }
+        self.check_keys()?;
         self.check_forces(geometry)?;
         positive("angle", "the angle", self.angle)?;
         if self.angle > 90.0 {
@@ -383,52 +400,56 @@ impl ContactSpec {
             let help = "facets of different bodies that face each other at most that far apart form pairs";
             return Err(Fault::new("", "[[contact]] has no `distance`", "`distance` is missing", help));
         }
-        let totals =
-            [("force", self.force.is_some()), ("preload", self.preload.is_some()), ("shear", self.shear.is_some())];
-        if let Some((key, _)) = totals.iter().find(|(_, is_given)| *is_given) {
-            let help = "name the two surfaces: between = [\"one\", \"other\"]";
-            return Err(Fault::new(*key, format!("`{key}` for pairs that are found"), "", help));
-        }
-        self.of.iter().flatten().try_for_each(check_name)?;
-        Ok(())
+        Ok(self.of.iter().flatten().try_for_each(check_name)?)
     }
 
     /// Check a surface before an obstacle.
-    fn check_obstacle(&self, on: Option<&Located<String>>) -> Result<(), Fault> {
-        let is_pair = !self.between[1].is_empty() && self.between[1].value != OBSTACLE;
-        match on {
-            Some(_) if is_pair => {
-                let help = "remove `between` or `on`";
-                Err(Fault::new("on", "[[contact]] has both `between` and `on`", "only one of them can hold", help))
-            }
-            Some(_) if !self.obstacle => {
-                let help = "one surface before a rigid obstacle has obstacle = true, two surfaces have between = [\"one\", \"other\"]";
-                Err(Fault::new("on", "`on` without an obstacle", "", help))
-            }
-            None => {
-                let help = "an obstacle is before one surface: on = \"top\"";
-                Err(Fault::new("obstacle", "[[contact]] has no `on`", "`on` is missing", help))
-            }
-            Some(_) if self.preload.is_some() => {
-                let help = "it has a force in each load step: force = F";
-                Err(Fault::new("preload", "a preload of an obstacle", "", help))
-            }
-            Some(on) => {
-                let of_meshes = [
-                    ("distance", self.distance.is_some()),
-                    ("angle", self.angle != angle()),
-                    ("touching", self.touching),
-                    ("shear", self.shear.is_some()),
-                    ("of", self.of.is_some()),
-                ];
-                if let Some((key, _)) = of_meshes.iter().find(|(_, is_given)| *is_given) {
-                    let help =
-                        "it is for the meshes of two bodies: the `gap` alone says where an obstacle is; remove it";
-                    return Err(Fault::new(*key, format!("`{key}` of an obstacle"), "", help));
-                }
-                Ok(pattern::check(on)?)
-            }
+    fn check_obstacle(&self) -> Result<(), Fault> {
+        let Some(on) = &self.on else {
+            let help = "an obstacle is before one surface: on = \"top\"";
+            return Err(Fault::new("obstacle", "[[contact]] has no `on`", "`on` is missing", help));
+        };
+        if !self.between[1].is_empty() && self.between[1].value != OBSTACLE {
+            let (message, help) = ("[[contact]] has both `between` and `on`", "remove `between` or `on`");
+            return Err(Fault::new("on", message, "only one of them can hold", help));
         }
+        if !self.obstacle {
+            let help = "one surface before a rigid obstacle has obstacle = true, two surfaces have between = [\"one\", \"other\"]";
+            return Err(Fault::new("on", "`on` without an obstacle", "", help));
+        }
+        Ok(pattern::check(on)?)
+    }
+
+    /// Refuse keys that mean nothing before the partner of the surface.
+    fn check_keys(&self) -> Result<(), Fault> {
+        use Partner::{Nearby, Obstacle, Surface};
+        let partner = self.partner();
+        let keys: [(_, _, &[Partner]); 11] = [
+            ("preload", self.preload.is_some(), &[Surface]),
+            ("shear", self.shear.is_some(), &[Surface]),
+            ("of", self.of.is_some(), &[Nearby]),
+            ("distance", self.distance.is_some(), &[Surface, Nearby]),
+            ("angle", self.angle != angle(), &[Surface, Nearby]),
+            ("touching", self.touching, &[Surface, Nearby]),
+            ("force", self.force.is_some(), &[Surface, Obstacle]),
+            ("approach", self.approach.is_some(), &[Obstacle]),
+            ("tilt", self.tilt.is_some(), &[Obstacle]),
+            ("moment", self.moment.is_some(), &[Obstacle]),
+            ("at", self.at.is_some(), &[Obstacle]),
+        ];
+        let means_nothing = |(_, is_given, before): &&(_, bool, &[Partner])| *is_given && !before.contains(&partner);
+        let Some((key, _, before)) = keys.iter().find(means_nothing) else { return Ok(()) };
+        let (whose, help) = match partner {
+            _ if before == &[Obstacle] => ("of a contact without an obstacle", "on = \"top\", obstacle = true"),
+            Surface => ("for surfaces with names", "it says which bodies form pairs with between = \"auto\""),
+            Nearby => ("for pairs that are found", "name the two surfaces: between = [\"one\", \"other\"]"),
+            Obstacle if *key == "preload" => ("of an obstacle", "it has a force in each load step: force = F"),
+            Obstacle => (
+                "of an obstacle",
+                "it is for the meshes of two bodies: the `gap` alone says where an obstacle is; remove it",
+            ),
+        };
+        Err(Fault::new(*key, format!("`{key}` {whose}"), "", help))
     }
 
     /// Check the forces and motions of obstacles and offsets.
@@ -451,10 +472,6 @@ impl ContactSpec {
         ];
         given.retain(|(_, values)| values.is_some());
         let of = |keys: &[&str]| given.iter().map(|(key, _)| *key).filter(|key| keys.contains(key)).collect::<Vec<_>>();
-        if let (false, [key, ..]) = (self.obstacle, &of(&["approach", "tilt", "moment", "at"])[..]) {
-            let help = "on = \"top\", obstacle = true";
-            return Err(Fault::new(*key, format!("`{key}` of a contact without an obstacle"), "", help));
-        }
         for keys in [of(&["approach", "force", "preload"]), of(&["tilt", "moment"])] {
             if let [first, second, ..] = keys[..] {
                 let message = format!("[[contact]] has both `{first}` and `{second}`");
@@ -498,6 +515,9 @@ impl ContactSpec {
     /// Check a pair of surfaces: two plain names.
     fn check_pair(&self) -> Result<(), Fault> {
         let [a, b] = &self.between;
+        if self.between.iter().all(|name| name.is_empty()) {
+            return Err(Fault::new("", "[[contact]] has no `between`", "`between` is missing", EXAMPLE));
+        }
         if a == b {
             let error = Error::scene(&b.place, format!("a contact between `{}` and itself", b.value));
             return Err(error.help("name one surface of each of two bodies").into());
@@ -505,10 +525,6 @@ impl ContactSpec {
         if let Some(name) = self.between.iter().find(|name| name.value == OBSTACLE) {
             let error = Error::scene(&name.place, format!("a surface called `{OBSTACLE}`"));
             return Err(error.label("rigid obstacles have this name").help("give the surface another name").into());
-        }
-        if self.of.is_some() {
-            let help = "it says which bodies form pairs with between = \"auto\"";
-            return Err(Fault::new("of", "`of` for surfaces with names", "", help));
         }
         if let Some(name) = self.between.iter().find(|name| name.contains(['*', '?'])) {
             let help =

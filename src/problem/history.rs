@@ -102,7 +102,10 @@ impl History {
     pub fn apply(&self, step: usize, bodies: &mut [BodySpec], contacts: &mut [ContactSpec]) {
         let of_step = self.steps.get(step).map(|step| step.factors.clone());
         let factors = of_step.clone().unwrap_or_else(|| vec![1.0; self.names.len().max(1)]);
-        contacts.iter_mut().for_each(|contact| contact.set_factors(&factors));
+        for contact in contacts {
+            let own = of_step.as_ref().map_or(1.0, |_| self.contact_factor(step, contact));
+            contact.set_step(&factors, own);
+        }
         let common = of_step.as_ref().map_or(1.0, |_| self.factor(step, None));
         for body in bodies.iter_mut() {
             let Some(temperature) = &mut body.temperature else { continue };
@@ -111,12 +114,6 @@ impl History {
         }
         if of_step.is_none() {
             return;
-        }
-        for contact in contacts {
-            contact.factor = match contact.preload {
-                Some(_) => self.preload_factor(step, contact),
-                None => self.factor(step, contact.path.as_ref()),
-            };
         }
         for body in bodies {
             body.load.iter_mut().for_each(|load| load.factor = self.factor(step, load.path.as_ref()));
@@ -127,15 +124,19 @@ impl History {
 }
 
 impl History {
-    /// Return the factor of the preload of a contact at a step. Without a path it is 1 in every step.
-    fn preload_factor(&self, step: usize, contact: &ContactSpec) -> f64 {
-        contact.path.as_ref().filter(|_| self.is_table()).map_or(1.0, |path| self.factor(step, Some(path)))
+    /// Return the factor of the forces and motions of a contact at a step. That of a preload without a path is 1 in every
+    /// step.
+    fn contact_factor(&self, step: usize, contact: &ContactSpec) -> f64 {
+        match contact.path.as_ref().filter(|_| self.is_table()) {
+            None if contact.preload.is_some() => 1.0,
+            path => self.factor(step, path),
+        }
     }
 
     /// Return whether a contact keeps in a step what the step before has found: its preload has the same factor in
     /// both.
     pub fn locks(&self, step: usize, contact: &ContactSpec) -> bool {
-        let factor = |step: usize| self.preload_factor(step, contact);
+        let factor = |step: usize| self.contact_factor(step, contact);
         contact.preload.is_some() && step > 0 && factor(step) == factor(step - 1)
     }
 }

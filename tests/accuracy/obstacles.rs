@@ -370,7 +370,7 @@ fn obstacles_that_cannot_be() {
     for (keys, words) in [
         ("force = 1\nmoment = [0, 0, 1]", "about its mean normal"),
         ("force = -1", "a negative `force`"),
-        ("preload = 1", "a preload of an obstacle"),
+        ("preload = 1", "`preload` of an obstacle"),
         ("approach = 1\nforce = 1", "both `approach` and `force`"),
         ("path = \"a\"", "`path` without a table"),
         ("force = 1\npath = \"a\"", "`path` without a table"),

@@ -4,7 +4,7 @@
 //! body once; a body is factored when its Robin term changed.
 
 use crate::common::here::solve_here;
-use crate::common::{Run, case, distance, solve, winkler_on};
+use crate::common::{Run, case, distance, solve, winkler, winkler_on};
 
 /// Bodies that factor their own G; condensed ones count at the end.
 const COARSE: [&str; 4] = ["--set", "mesh.set.n=8", "--set", "solver=mumps"];
@@ -217,6 +217,27 @@ fn a_sweep_makes_what_a_setting_touches() {
         let expected = [[2, 1, 0, 1], [2, 2, 2, 0], [2, 1, 0, 0]];
         assert!(reports.iter().map(made).eq(expected), "{ranks}");
     }
+}
+
+/// Newton's method starts from the pressures of the run before, which halves its steps here, or automatically where too
+/// many steps would follow. Methods and solvers all have the automatic start, so that they can be compared.
+#[test]
+fn a_sweep_starts_from_the_run_before() {
+    let newton = "method={name=\"newton\"}";
+    let steps = |over: &[&str]| -> Vec<u64> {
+        sweep(over, &["--set", newton]).iter().map(|report| report["iterations"].as_u64().expect("a count")).collect()
+    };
+    let alone = solve_here(case("groove"), &["mesh.set.n=8", newton, "contact.0.layer.power.B=1e-5"]);
+    let near = steps(&["contact.0.layer.power.B=2e-5,1e-5"])[1] as f64;
+    assert!(near + 2.0 <= alone.number("iterations"), "{near} {}", alone.number("iterations"));
+    let solvers = steps(&["contact.0.layer.power.B=1e-5", "solver=mumps,condensed"]);
+    assert_eq!(solvers[0], solvers[1]);
+    // from pressures of another size than its own the second run would take five steps, instead of three
+    let path = case("hertz-line").display().to_string();
+    let limit = "method={stop={residual=1e-8, iterations=4}}";
+    let over = "contact.0.layer={power={B=1e-2,a=0.5}},{power={B=1e-3,a=0.5}}";
+    let run = winkler(&["sweep", &path, "-o", "out", "--set", "mesh.set.n=3", "--set", limit, "--over", over]);
+    assert_eq!(run.code, 0, "{}", run.said());
 }
 
 /// A factor has the normals of curved surfaces as axes of their nodes, and multigrid has not. Bodies do not serve both.
