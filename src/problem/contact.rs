@@ -86,6 +86,13 @@ pub struct ContactSpec {
     pub unload: Option<UnloadSpec>,
     /// stiffness of a bonded layer against slip: traction along the surface over slip
     pub shear: Option<Field>,
+    /// groups inside and outside of a seal, at ends of the contact surface of one body: seal = ["bore", "outside"]
+    ///
+    /// They share edges with the surface, in the plane points. This surface carries the contact points, so that ways
+    /// from one end to the other go along its mesh.
+    #[serde(default, deserialize_with = "seal")]
+    #[schemars(with = "Option<Vec<String>>")]
+    pub seal: Option<[Located<String>; 2]>,
     /// whether the surface `on` is before a rigid obstacle, which is given by the gap
     #[serde(default)]
     pub obstacle: bool,
@@ -155,6 +162,7 @@ impl ContactSpec {
             tension: None,
             unload: None,
             shear: None,
+            seal: None,
             obstacle: false,
             approach: None,
             tilt: None,
@@ -215,7 +223,8 @@ impl ContactSpec {
     pub fn has_points_of(&self, other: &Self) -> bool {
         let of = |spec: &Self| {
             let kinds = [spec.obstacle, spec.is_touching(), spec.preload.is_some()];
-            (spec.table, spec.between.clone(), spec.of.clone(), spec.distance, [spec.angle, spec.edge], kinds)
+            let names = (spec.between.clone(), spec.of.clone(), spec.seal.clone());
+            (spec.table, names, spec.distance, [spec.angle, spec.edge], kinds)
         };
         of(self) == of(other)
     }
@@ -319,7 +328,7 @@ pub enum Overlap {
     Refuse,
 }
 
-compile!(ContactSpec { between, on, of, layer, tension, unload, shear, at, path, reference } else {
+compile!(ContactSpec { between, on, of, layer, tension, unload, shear, seal, at, path, reference } else {
     gap, approach, force, tilt, moment, distance, angle, edge, touching, bond, obstacle, preload, overlap, table, slip, factor
 } then compile_steps);
 
@@ -372,6 +381,10 @@ impl Check for ContactSpec {
             }
             positive("shear", "the stiffness", if shear.is_constant() { shear.number() } else { 1.0 })?;
         }
+        if let Some([first, second]) = self.seal.as_ref().filter(|[first, second]| first == second) {
+            let error = Error::scene(&second.place, format!("a seal between `{}` and itself", first.value));
+            return Err(error.help(SEAL).into());
+        }
         self.distance.map_or(Ok(()), |distance| positive("distance", "the distance", distance))
     }
 }
@@ -383,8 +396,12 @@ impl ContactSpec {
             let help = "facets of different bodies that face each other at most that far apart form pairs";
             return Err(Fault::new("", "[[contact]] has no `distance`", "`distance` is missing", help));
         }
-        let totals =
-            [("force", self.force.is_some()), ("preload", self.preload.is_some()), ("shear", self.shear.is_some())];
+        let totals = [
+            ("force", self.force.is_some()),
+            ("preload", self.preload.is_some()),
+            ("shear", self.shear.is_some()),
+            ("seal", self.seal.is_some()),
+        ];
         if let Some((key, _)) = totals.iter().find(|(_, is_given)| *is_given) {
             let help = "name the two surfaces: between = [\"one\", \"other\"]";
             return Err(Fault::new(*key, format!("`{key}` for pairs that are found"), "", help));
@@ -568,10 +585,25 @@ fn write_between<S: Serializer>(between: &[Located<String>; 2], serializer: S) -
 
 /// Read two names of bodies, or patterns of names.
 fn of<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<[Located<String>; 2]>, D::Error> {
-    let Located { value: names, place } = Located::<Vec<Located<String>>>::deserialize(deserializer)?;
-    let names: [Located<String>; 2] = names.try_into().map_err(|_| {
-        refused(Error::scene(&place, "pairs are of two bodies").help("write of = [\"one_*\", \"other_*\"]"))
-    })?;
-    names.iter().try_for_each(pattern::check).map_err(refused)?;
+    let names = two_names(deserializer, "pairs are of two bodies", "write of = [\"one_*\", \"other_*\"]")?;
     Ok(Some(names.map(|name| Located { value: plain_pattern(&name.value), ..name })))
+}
+
+/// What to write for a seal.
+const SEAL: &str = "name what is on either side of it: seal = [\"bore\", \"outside\"]";
+
+/// Read the groups at both ends of a seal.
+fn seal<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<[Located<String>; 2]>, D::Error> {
+    two_names(deserializer, "a seal is between two groups", SEAL).map(Some)
+}
+
+/// Read two names. `message` and `help` are the error of any other number of them.
+fn two_names<'de, D: Deserializer<'de>>(
+    deserializer: D,
+    message: &str,
+    help: &str,
+) -> Result<[Located<String>; 2], D::Error> {
+    let Located { value: names, place } = Located::<Vec<Located<String>>>::deserialize(deserializer)?;
+    names.iter().try_for_each(pattern::check).map_err(refused)?;
+    names.try_into().map_err(|_| refused(Error::scene(&place, message).help(help)))
 }
