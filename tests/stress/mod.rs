@@ -150,6 +150,12 @@ fn no_method_claims_what_it_has_not(bench: &Bench) {
     // a soft bond lets nothing resist the rise of both blocks from an obstacle
     let case = mixed::scene(777123, 45, Path::new(env!("CARGO_MANIFEST_DIR")));
     assert_eq!(bench.solve(case, &["auto"]).0[0].1.status, "unbounded");
+    // steps that led in a circle where a crushed layer is stiff, and then soft again: with bodies that yield, and before an obstacle on a face that is held
+    for (seed, index) in [(1795998884, 243), (1795999505, 59)] {
+        let case = crushed::scene(seed, index, Path::new(env!("CARGO_MANIFEST_DIR")));
+        let answer = &bench.solve(case, &["auto"]).0[0].1;
+        assert!(answer.claims && answer.iterations <= 60, "{index}: {} {}", answer.iterations, answer.message);
+    }
     // the residual is met, but a body is not in balance yet: that is neither converged nor rounding
     let answer = &bench.run(1, 123, &["0.6"]).0[0].1;
     assert_eq!(answer.status, "iteration-limit");

@@ -129,7 +129,7 @@ fn attempt(session: &Session, path: &Path, recipe: &Recipe, residual: f64) -> Re
         seconds,
         force: (0..model.pairs.len()).map(|i| model.range(i).map(|q| outcome.layer.force[q]).sum()).collect(),
         pressure: outcome.layer.pressure,
-        claims: outcome.status.is_solved(),
+        claims: outcome.status.is_solved() && done.steps.iter().all(|step| step.status.is_solved()),
         history: outcome.rows.iter().map(|row| format!("{:.1e}/{}", row.residual, row.closed)).collect(),
     })
 }
