@@ -2,6 +2,8 @@
 
 #[path = "../tests/stress/builder.rs"]
 mod builder;
+#[path = "../tests/stress/crushed.rs"]
+mod crushed;
 #[path = "../tests/stress/laws.rs"]
 mod laws;
 #[path = "../tests/stress/mixed.rs"]
@@ -36,7 +38,8 @@ use winkler::petsc::Session;
 /// starts. With --slender they are leaves, discs, plates, frames and hoops from 1:5 to 1:200, in the plane, of
 /// revolution and in space. A seed stands for other scenes then.
 ///
-/// With --mixed they have obstacles, bonds and forces besides. With --saturating the layers saturate.
+/// With --mixed they have obstacles, bonds and forces besides, with --crushed also layers that remember, load steps, and
+/// bonds that carry shear. With --saturating the layers saturate.
 ///
 /// Exits with 1 if the default method fails on a scene that has a solution, or if any method is wrong.
 #[derive(Parser)]
@@ -57,8 +60,11 @@ struct Arguments {
     /// Draws obstacles, bonds and forces
     #[arg(long, conflicts_with_all = ["wide", "slender"])]
     mixed: bool,
-    /// Draws layers that saturate
+    /// Draws layers that remember, and bonds that carry shear
     #[arg(long, conflicts_with_all = ["wide", "slender", "mixed"])]
+    crushed: bool,
+    /// Draws layers that saturate
+    #[arg(long, conflicts_with_all = ["wide", "slender", "mixed", "crushed"])]
     saturating: bool,
     /// Seed of the series
     #[arg(long, default_value_t = 1)]
@@ -72,6 +78,24 @@ struct Arguments {
     /// Writes the scene files into this folder
     #[arg(long, value_name = "FOLDER", num_args = 0..=1, default_missing_value = "stress-scenes")]
     keep: Option<PathBuf>,
+}
+
+/// Draws a scene of a series, given by its seed, its number and the folder of the program.
+type Draw = fn(u64, usize, &Path) -> Case;
+
+impl Arguments {
+    /// The family of the scenes, and the option for it.
+    fn family(&self) -> (Draw, &'static str) {
+        let families: [(bool, Draw, &str); 5] = [
+            (self.wide, wide::scene, " --wide"),
+            (self.slender, slender::scene, " --slender"),
+            (self.mixed, mixed::scene, " --mixed"),
+            (self.crushed, crushed::scene, " --crushed"),
+            (self.saturating, saturating::scene, " --saturating"),
+        ];
+        let asked = families.into_iter().find(|(is_asked, ..)| *is_asked);
+        asked.map_or((scenes::scene, ""), |(_, draw, option)| (draw, option))
+    }
 }
 
 /// What a method did on all scenes.
@@ -160,13 +184,7 @@ fn refuse_unknown(methods: &[String]) -> Result<()> {
 
 /// Draws a scene and writes its file.
 fn write(arguments: &Arguments, folder: &Path, index: usize) -> Result<(Case, PathBuf)> {
-    let draw = match (arguments.wide, arguments.slender) {
-        (true, _) => wide::scene,
-        (_, true) => slender::scene,
-        _ if arguments.mixed => mixed::scene,
-        _ if arguments.saturating => saturating::scene,
-        _ => scenes::scene,
-    };
+    let (draw, _) = arguments.family();
     let case = draw(arguments.seed, index, Path::new(env!("CARGO_MANIFEST_DIR")));
     let path = folder.join(format!("scene-{}-{index}.toml", arguments.seed));
     let text = format!("# {}\n{}", case.line, case.text);
@@ -301,12 +319,8 @@ impl<'a> Results<'a> {
         let mut last = usize::MAX;
         for Failure { index, line, scene } in failures {
             if *index != last {
-                let family = match (arguments.wide, arguments.slender) {
-                    (true, _) => " --wide",
-                    (_, true) => " --slender",
-                    _ => "",
-                };
-                println!("\n`scripts/stress{family} --seed {} --only {index} --keep`: {scene}\n", arguments.seed);
+                let (_, option) = arguments.family();
+                println!("\n`scripts/stress{option} --seed {} --only {index} --keep`: {scene}\n", arguments.seed);
                 last = *index;
             }
             println!("- {line}");

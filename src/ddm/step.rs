@@ -209,15 +209,22 @@ pub(super) struct Equilibrium<'a> {
 impl Equilibrium<'_> {
     /// Return sum omega e^2/rho with e = p - p_q: the squared distance from the laws with this smoothing. Components of
     /// e below the roundoff level are ignored, so that states that differ by roundoff have the same distance.
+    ///
+    /// On a line of infinite slope, at a point that both sides hold, the state is that at c itself. Its e counts by the
+    /// stiffest tangent of the pair: a rigid part may still move, and its Newton steps may run in a circle.
     pub fn distance(&self, model: &Model, smoothing: &[f64]) -> f64 {
         let Self { compression, roundoff, pressure, rho } = *self;
         let resolved = Layer::resolve(model, compression, pressure, rho, smoothing);
-        let known = |q: usize| rho[q] * roundoff[q] + f64::EPSILON * (pressure[q].abs() + resolved.pressure[q]);
+        let mut slopes = rho.to_vec();
+        for range in (0..model.pairs.len()).map(|pair| model.range(pair)) {
+            let stiffest = resolved.tangent[range.clone()].iter().copied().fold(0.0, f64::max);
+            slopes[range].iter_mut().filter(|slope| **slope == f64::INFINITY).for_each(|slope| *slope = stiffest);
+        }
+        let known = |q: usize| slopes[q] * roundoff[q] + f64::EPSILON * (pressure[q].abs() + resolved.pressure[q]);
         // `clamp` keeps NaN, which is not nearer than any distance
         let difference = |q: usize| ((pressure[q] - resolved.pressure[q]).abs() - known(q)).clamp(0.0, f64::INFINITY);
-        let squared = |q: usize| model.area[q] * difference(q).powi(2) / rho[q];
-        // on a line of infinite slope the state is that at c itself
-        (0..model.points()).filter(|&q| rho[q] < f64::INFINITY).map(squared).sum()
+        let squared = |(q, e): (usize, f64)| model.area[q] * e.powi(2) / slopes[q];
+        (0..model.points()).map(|q| (q, difference(q))).filter(|(_, e)| *e != 0.0).map(squared).sum()
     }
 }
 
@@ -282,6 +289,17 @@ mod tests {
         assert_eq!(begin().go(0.25, pressure.to_vec()), [2.0, 2.0, 1.0, 1.0]);
         let away = length(&mut begin(), &rho, &exact, &[0.5, -9.0, 1.0, 1.0], &[2.0, 99.0, 1.0, 1.0]);
         assert_eq!(away, None);
+    }
+
+    /// A point that both sides hold is off the law p = 4 c of its pair by 1, which counts by the stiffness 4.
+    #[test]
+    fn held_points_have_a_distance() {
+        let (model, rho) = (two_pairs(), [f64::INFINITY, 0.5, 0.25, 3.0]);
+        let distance = |p: f64| {
+            let (pressure, roundoff) = (&[p, 2.0, 1.0, 1.0], &[0.0; 4]);
+            Equilibrium { compression: &[0.5, 0.5, 1.0, 1.0], roundoff, pressure, rho: &rho }.distance(&model, &[])
+        };
+        assert_eq!((distance(2.0), distance(3.0)), (0.0, model.area[0] / 4.0));
     }
 
     /// What a pair's points answered together, beside their own stiffness; nothing counts as a millionth. With smoothed

@@ -36,11 +36,7 @@ impl ContactSurface {
     /// Collect the facets of side a. Facets without a partner have no values.
     pub fn new<const D: usize>(a: &Side<D>, pair: &ContactPair) -> Self {
         let point_of = pair.point_of(a.nodes.len());
-        let order = a.facets.order;
-        let places: Vec<[f64; D]> = match order {
-            Order::P1 | Order::P2 => element::nodes(order),
-            _ => lagrange::equally_spaced(order, D).iter().map(|l| std::array::from_fn(|k| l[k])).collect(),
-        };
+        let (order, places) = (a.facets.order, places::<D>(a.facets.order));
         let mut surface = Self {
             points: Vec::new(),
             cell: CellKind { dimension: D - 1, order: order.degree() },
@@ -93,6 +89,11 @@ impl ContactSurface {
         &self.points
     }
 
+    /// Return the points of all facets, facet by facet in the order of their nodes.
+    pub fn connectivity(&self) -> &[u32] {
+        &self.connectivity
+    }
+
     /// Return the middle of the corners of a facet.
     pub fn middle(&self, facet: usize) -> [f64; 3] {
         let corners = &self.connectivity[facet * self.cell.stride()..][..self.cell.dimension + 1];
@@ -114,24 +115,22 @@ impl ContactSurface {
         nodes.flat_map(|&node| &self.sources[node as usize]).map(|(q, _)| *q)
     }
 
-    /// Return the mesh with arrays of values at the contact points. Points of the mesh without a contact point get NaN.
-    /// Extrapolated values stay between those from which they come, so that a pressure is never negative nor above its
-    /// peak.
-    pub fn grid(&self, name: String, arrays: Vec<FieldArray>) -> UnstructuredGrid {
-        let spread = |components: usize, values: &[f64]| {
-            let at = |sources: &Vec<(usize, f64)>, c: usize| {
-                let of = |q: usize| values[components * q + c];
-                let extreme =
-                    |pick: fn(f64, f64) -> f64| sources.iter().fold(f64::NAN, |all, &(q, _)| pick(all, of(q)));
-                let value: f64 = sources.iter().map(|&(q, share)| share * of(q)).sum();
-                // Without sources the bounds are NaN, which `max` would ignore.
-                if sources.is_empty() { f64::NAN } else { value.max(extreme(f64::min)).min(extreme(f64::max)) }
-            };
-            self.sources
-                .iter()
-                .flat_map(|sources| (0..components).map(|c| at(sources, c)).collect::<Vec<_>>())
-                .collect()
+    /// Return the values of an array at the points of the mesh from those at the contact points, and `other` at points
+    /// of the mesh without a contact point. Extrapolated values stay between those from which they come, so that a
+    /// pressure is never negative nor above its peak.
+    pub fn spread(&self, components: usize, values: &[f64], other: f64) -> Vec<f64> {
+        let at = |sources: &Vec<(usize, f64)>, c: usize| {
+            let of = |q: usize| values[components * q + c];
+            let extreme = |pick: fn(f64, f64) -> f64| sources.iter().fold(f64::NAN, |all, &(q, _)| pick(all, of(q)));
+            let value: f64 = sources.iter().map(|&(q, share)| share * of(q)).sum();
+            // Without sources the bounds are NaN, which `max` would ignore.
+            if sources.is_empty() { other } else { value.max(extreme(f64::min)).min(extreme(f64::max)) }
         };
+        self.sources.iter().flat_map(|sources| (0..components).map(|c| at(sources, c)).collect::<Vec<_>>()).collect()
+    }
+
+    /// Return the mesh with arrays of values at the contact points. Points of the mesh without a contact point get NaN.
+    pub fn grid(&self, name: String, arrays: Vec<FieldArray>) -> UnstructuredGrid {
         UnstructuredGrid {
             title: name,
             points: self.points.clone(),
@@ -139,10 +138,27 @@ impl ContactSurface {
             connectivity: self.connectivity.clone(),
             at_points: arrays
                 .into_iter()
-                .map(|array| FieldArray { values: spread(array.components, &array.values), ..array })
+                .map(|array| FieldArray { values: self.spread(array.components, &array.values, f64::NAN), ..array })
                 .collect(),
             at_cells: vec![FieldArray::new("cover", 1, self.cover.clone())],
         }
+    }
+}
+
+/// Return the corners of a facet or edge as sorted points of the mesh. A facet in space has three; in place of those that
+/// others lack there is no point.
+pub fn corners(points: impl Iterator<Item = u32>) -> [u32; 3] {
+    let mut corners = [u32::MAX; 3];
+    corners.iter_mut().zip(points).for_each(|(corner, point)| *corner = point);
+    corners.sort_unstable();
+    corners
+}
+
+/// Return the barycentric coordinates of the points of a facet that are in files, in the order of its nodes.
+pub fn places<const D: usize>(order: Order) -> Vec<[f64; D]> {
+    match order {
+        Order::P1 | Order::P2 => element::nodes(order),
+        _ => lagrange::equally_spaced(order, D).iter().map(|l| std::array::from_fn(|k| l[k])).collect(),
     }
 }
 

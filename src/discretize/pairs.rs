@@ -3,9 +3,10 @@
 
 use super::auto::{self, SurfacePair};
 use super::carrier;
-use super::contact_surface::ContactSurface;
+use super::contact_surface::{ContactSurface, corners};
 use super::groups::{Owners, find_group, point};
 use super::scene_body::SceneBody;
+use super::seal::{self, Seal, Sealing};
 use crate::contact::law::{self, OwnLaws};
 use crate::contact::pieces::{Cut, Intersection, Reach};
 use crate::contact::{self, Chords, ContactPair, Fault, Fine, Mirrors, Side, Tangents, Turns};
@@ -79,6 +80,8 @@ pub struct ContactFacts {
     pub surface: ContactSurface,
     /// Facets of both sides that face each other.
     pub facing: Vec<Facing>,
+    /// The ways of a fluid along the surface, if the scene names two ends of it.
+    pub seal: Option<Seal>,
 }
 
 /// A facet of side a and one of side b that face each other.
@@ -110,15 +113,6 @@ impl Facing {
         };
         met.into_iter().map(facing).collect()
     }
-}
-
-/// Return the corners of a facet as sorted points of the mesh, which are three in space. In the plane the last one is
-/// no point.
-pub fn corners(points: impl Iterator<Item = u32>) -> [u32; 3] {
-    let mut corners = [u32::MAX; 3];
-    corners.iter_mut().zip(points).for_each(|(corner, point)| *corner = point);
-    corners.sort_unstable();
-    corners
 }
 
 impl ContactFacts {
@@ -163,13 +157,13 @@ pub fn all<const D: usize>(
     let rules: Vec<&ContactSpec> = scene.rules().collect();
     let (mut all, mut searched, mut taken) = (Vec::new(), 0, HashSet::new());
     for spec in scene.pairs() {
-        let pair = named(spec, mesh, &owners, parts)?.orient(scene, parts);
+        let pair = named(spec, mesh, &owners, parts)?.orient(scene, mesh, parts)?;
         taken.insert([pair.bodies[0].min(pair.bodies[1]), pair.bodies[0].max(pair.bodies[1])]);
         if let Some(contact) = kept.take(&pair, fine) {
             all.push(contact.renewed(spec, &scene.laws, parts)?);
         } else {
             searched += 1;
-            all.extend(pair.assemble(&scene.laws, parts, cut, fine)?);
+            all.extend(pair.assemble(scene, mesh, parts, cut, fine)?);
         }
     }
     let count = all.len();
@@ -181,7 +175,7 @@ pub fn all<const D: usize>(
     } else {
         for pair in auto::find(&rules, cut, parts, &taken)? {
             searched += 1;
-            all.extend(pair.orient(scene, parts).assemble(&scene.laws, parts, cut, fine)?);
+            all.extend(pair.orient(scene, mesh, parts)?.assemble(scene, mesh, parts, cut, fine)?);
         }
     }
     if searched > 0 {
@@ -332,16 +326,25 @@ impl<'a, const D: usize> SurfacePair<'a, D> {
     }
 
     /// Let the first of the two sides be the one that carries the points.
-    fn orient(mut self, scene: &Scene, parts: &[SceneBody<D>]) -> Self {
+    ///
+    /// # Errors
+    /// See [`seal::carrier`].
+    fn orient(mut self, scene: &Scene, mesh: &Mesh<D>, parts: &[SceneBody<D>]) -> Result<Self> {
         let Self { spec, bodies, sides, .. } = &self;
         let facets = sides.each_ref().map(|side| &side.facets);
-        if !spec.obstacle && carrier::is_second(parts, *bodies, facets, spec.table, &scene.carriers) {
+        let mut is_second = !spec.obstacle && carrier::is_second(parts, *bodies, facets, spec.table, &scene.carriers);
+        if let Some(names) = &spec.seal {
+            let surface = |k: usize| Some(Sealing { side: &sides[k], points: &parts.get(bodies[k])?.mesh.points });
+            let surfaces: Vec<Sealing<D>> = (0..2).filter_map(surface).collect();
+            is_second = seal::carrier(names, mesh, &surfaces, usize::from(is_second))? == 1;
+        }
+        if is_second {
             self.swapped = true;
             self.bodies.reverse();
             self.sides.reverse();
             self.far.reverse();
         }
-        self
+        Ok(self)
     }
 
     /// Return what both surfaces have in common, the same with their distances if these do not count, and whether they
@@ -372,7 +375,8 @@ impl<'a, const D: usize> SurfacePair<'a, D> {
     /// that was found have no common piece.
     fn assemble(
         mut self,
-        laws: &OwnLaws,
+        scene: &Scene,
+        mesh: &Mesh<D>,
         parts: &[SceneBody<D>],
         cut: Cut<D>,
         fine: bool,
@@ -388,7 +392,7 @@ impl<'a, const D: usize> SurfacePair<'a, D> {
         }
         let spec = between(spec, names.clone());
         let gap = |x| spec.gap.eval(x);
-        let law = |position: &[[f64; 3]]| law::of_pair(&spec, laws, position);
+        let law = |position: &[[f64; 3]]| law::of_pair(&spec, &scene.laws, position);
         let mut pair = match contact::assemble(&a, &b, bodies, &common, &gap, &law) {
             Err(Fault::NoPartner) if is_found => return Ok(None),
             assembled => assembled.map_err(|fault| refuse(&spec, fault, || why(&a, &b, cut)))?,
@@ -396,6 +400,7 @@ impl<'a, const D: usize> SurfacePair<'a, D> {
         pair.surfaces = surfaces;
         check(&pair, &spec)?;
         let surface = ContactSurface::new(&a, &pair);
+        let seal = seal::of_pair(&spec, mesh, &Sealing { side: &a, points: &parts[bodies[0]].mesh.points }, &surface)?;
         let jumps = |k: usize, side: &Side<D>| match parts.get(bodies[k]) {
             Some(part) => jumping(side.space, &part.elasticity, &side.facets.nodes),
             None => HashSet::new(),
@@ -421,7 +426,7 @@ impl<'a, const D: usize> SurfacePair<'a, D> {
         let fine = fine.map(Rc::new);
         Ok(Some(Contact {
             pair,
-            facts: ContactFacts { table: spec.table, names, chords, ends, swapped, surface, facing },
+            facts: ContactFacts { table: spec.table, names, chords, ends, swapped, surface, facing, seal },
             inputs: PairInputs { spec, bodies, mirrors: [a.mirrors, b.mirrors], is_through, is_found, fine },
         }))
     }

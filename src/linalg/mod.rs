@@ -319,6 +319,11 @@ impl DisjointSets {
         self.0[a.max(b) as usize] = a.min(b);
     }
 
+    /// Return whether two things are in one set.
+    pub fn are_joined(&mut self, a: u32, b: u32) -> bool {
+        self.root(a) == self.root(b)
+    }
+
     /// Return the number of sets, and the index of the set of each thing. Sets are numbered in the order of their first
     /// things.
     pub fn classes(mut self) -> (usize, Vec<u32>) {

@@ -2,7 +2,7 @@
 
 use super::report::{
     BalanceReport, BodyReport, ForceReport, IntervalReport, LISTED, ObstacleReport, PairReport, PairResult, Report,
-    RoundReport, StepReport, TensionReport, UnmetReport, busiest,
+    RoundReport, SealReport, StepReport, TensionReport, UnmetReport, busiest,
 };
 use super::{RunStatus, sci, seconds};
 use std::collections::BTreeSet;
@@ -236,10 +236,8 @@ fn largest(displacement: Option<f64>, von_mises: Option<f64>, place: &str, units
 fn pair_line(pair: &PairReport, is_bonded: bool, units: &UnitWords) -> String {
     let (PairReport { surfaces: [a, b], bodies: [on, _], result, estimate, .. }, extent) = (pair, pair.result.extent);
     if result.shear {
-        let TensionReport { peak_tension, peak_stretch, .. } = result.tension.unwrap_or_default();
-        let (traction, slip) = (result.peak_pressure.max(peak_tension), result.peak_compression.max(peak_stretch));
-        let sum = units.vector(result.force[0], traction * extent.contact());
-        let (traction, slip) = (readable(traction, 6), sci(slip, 3));
+        let sum = units.vector(result.force[0], result.peak_pressure * extent.contact());
+        let (traction, slip) = (readable(result.peak_pressure, 6), sci(result.peak_compression, 3));
         let UnitWords { stress, force, length, .. } = units;
         return format!(
             "  {a} - {b}: shear force on `{on}` {sum}{force}, traction up to {traction}{stress}, slip up to {slip}{length}"
@@ -262,11 +260,15 @@ fn pair_line(pair: &PairReport, is_bonded: bool, units: &UnitWords) -> String {
     let peak = result.peak_pressure.max(result.tension.map_or(0.0, |tension| tension.peak_tension));
     let scale = peak * (extent.contact() + extent.open());
     let error = estimate.map(|errors| format!(", estimated error of pressures {}", sci(errors.pressure_estimate, 1)));
+    let sealing = |SealReport { sealing_pressure, sealing_at }: SealReport| {
+        format!(", sealing pressure {}{} at {}", readable(sealing_pressure, 6), units.stress, units.point(sealing_at))
+    };
     format!(
-        "  {a} - {b}: force on `{on}` {}{force}, normal force {}{force}{more}, {}, {what} {closed} {}{size}, {open} {}{size}{}",
+        "  {a} - {b}: force on `{on}` {}{force}, normal force {}{force}{more}, {}{}, {what} {closed} {}{size}, {open} {}{size}{}",
         units.vector(result.force[0], scale),
         readable(result.normal_force, 6),
         peaks(result, true, units),
+        result.seal.map_or(String::new(), sealing),
         readable(extent.contact(), 6),
         readable(extent.open(), 6),
         error.unwrap_or_default()

@@ -23,8 +23,8 @@ pub use mark::{Mark, Role};
 pub use plot::{Color, LEGEND, Plot, PlotAxis, Series, Style};
 pub use report::{
     BalanceReport, BodyReport, EstimateReport, Extent, ForceReport, InnerTimes, IntervalReport, LISTED, ObstacleReport,
-    PairEstimate, PairReport, PairResult, ReactionReport, Report, RoundReport, StepReport, TensionReport, UnmetReport,
-    busiest,
+    PairEstimate, PairReport, PairResult, ReactionReport, Report, RoundReport, SealReport, StepReport, TensionReport,
+    UnmetReport, busiest,
 };
 pub use status::RunStatus;
 pub use tables::{ContactTable, HistoryWriter, ResultNames, RowFile, StepTable};

@@ -330,14 +330,14 @@ pub struct PairResult {
     pub moment: [[f64; 3]; 2],
     /// Approach of the bodies along the mean normal; null where normals cancel.
     pub approach: Option<f64>,
-    /// Sum of the pressures times their areas. It is not the resultant of `force` where normals differ, as around a
-    /// shaft.
+    /// Sum of the pressures times their areas, tensions of a bond counted negative. It is not the resultant of `force`
+    /// where normals differ, as around a shaft.
     #[serde(deserialize_with = "numbers")]
     pub normal_force: f64,
     /// Least pressure of the points with c > 0; zero without any.
     #[serde(deserialize_with = "numbers")]
     pub least_pressure: f64,
-    /// Mean pressure of the part in contact; zero without contact.
+    /// Mean pressure of the part in contact, of a bond that of the compressed part; zero without contact.
     #[serde(deserialize_with = "numbers")]
     pub mean_pressure: f64,
     /// Largest pressure; zero where a bond only pulls.
@@ -374,7 +374,11 @@ pub struct PairResult {
     /// Closing of the gap (a length) that was found for the force or preload of the pair, or that a step keeps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub offset: Option<f64>,
-    /// True for the shear of a bond: pressures are tractions along the surface, and compressions slips.
+    /// What its seal holds, if the scene names the ends of one.
+    #[serde(flatten)]
+    pub seal: Option<SealReport>,
+    /// True for the shear of a bond: pressures are sizes of tractions along the surface in one direction, and
+    /// compressions sizes of slips.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub shear: bool,
 }
@@ -401,6 +405,17 @@ pub struct TensionReport {
     /// Largest stretch of the layer; zero where all of it is compressed.
     #[serde(deserialize_with = "numbers")]
     pub peak_stretch: f64,
+}
+
+/// What the weakest way along a contact surface, from one end to the other, holds.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct SealReport {
+    /// Largest contact pressure on the way where this is least; zero where a way is open.
+    #[serde(deserialize_with = "numbers")]
+    pub sealing_pressure: f64,
+    /// Point with this pressure (x, y, z).
+    #[serde(deserialize_with = "numbers")]
+    pub sealing_at: [f64; 3],
 }
 
 /// The report of an obstacle.

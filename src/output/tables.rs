@@ -3,7 +3,7 @@
 
 use super::field;
 use super::folder::{Folder, failed};
-use super::report::{PairReport, PairResult, ReactionReport, StepReport, TensionReport};
+use super::report::{PairReport, PairResult, ReactionReport, SealReport, StepReport, TensionReport};
 use crate::ddm::{Observer, Row};
 use crate::error::Result;
 use std::fs::File;
@@ -166,7 +166,7 @@ impl ResultNames {
         fields.push(number(format!("layer_energy {name}"), pair.layer_energy));
         fields.extend(vector("force", name, &pair.force[0], self.dimension));
         fields.push(number(format!("approach {name}"), pair.approach));
-        fields.push(number(format!("least_pressure {name}"), pair.least_pressure));
+        fields.extend(sealing(pair, name));
         fields
     }
 
@@ -185,7 +185,7 @@ impl ResultNames {
             }
         }
         fields.extend(pair.offset.map(|offset| number(format!("offset {name}"), offset)));
-        fields.push(number(format!("least_pressure {name}"), pair.least_pressure));
+        fields.extend(sealing(pair, name));
         fields
     }
 
@@ -211,6 +211,16 @@ fn pressures(pair: &PairResult, name: &str) -> Vec<Cell> {
     if let Some(TensionReport { peak_tension, peak_tension_at, .. }) = tension {
         fields.push(number(format!("peak_tension {name}"), peak_tension));
         fields.extend(vector("tension", name, &peak_tension_at, 3));
+    }
+    fields
+}
+
+/// Return the fields of the least pressure of a pair, and of what its seal holds and where, if it has one.
+fn sealing(pair: &PairResult, name: &str) -> Vec<Cell> {
+    let mut fields = vec![number(format!("least_pressure {name}"), pair.least_pressure)];
+    if let Some(SealReport { sealing_pressure, sealing_at }) = pair.seal {
+        fields.push(number(format!("sealing_pressure {name}"), sealing_pressure));
+        fields.extend(vector("sealing", name, &sealing_at, 3));
     }
     fields
 }
@@ -264,6 +274,9 @@ fn pair_fields(pair: &PairReport) -> Vec<Cell> {
     fields.push(number("least_pressure", result.least_pressure));
     fields.push(number("pressure_estimate", estimate.map(|errors| errors.pressure_estimate)));
     fields.push(number("force_estimate", estimate.map(|errors| errors.force_estimate)));
+    fields.push(number("sealing_pressure", result.seal.map(|seal| seal.sealing_pressure)));
+    let weakest = result.seal.map_or([f64::NAN; 3], |seal| seal.sealing_at);
+    fields.extend(three(["sealing_x", "sealing_y", "sealing_z"], weakest));
     fields
 }
 
@@ -378,6 +391,7 @@ mod tests {
             opening: [0.5, 2.0],
             layer_energy: 10.0,
             approach: Some(11.0),
+            seal: Some(SealReport { sealing_pressure: 1.5, sealing_at: [3.0, 2.0, 1.0] }),
             obstacle: Some(ObstacleReport {
                 tilt: [0.1, 0.2, 0.3],
                 moment: [4.0, 5.0, 6.0],
@@ -398,10 +412,10 @@ mod tests {
         save(&Folder::create(base.path()).unwrap(), &[pair]).unwrap();
         let text = std::fs::read_to_string(base.path().join("contacts.csv")).unwrap();
         let (header, line) = text.trim().split_once('\n').unwrap();
-        assert_eq!(header.split(',').count(), 40);
+        assert_eq!(header.split(',').count(), 44);
         assert_eq!(
             line,
-            "up,low,up_bottom,low_top,2,1,1.0,2.0,3.0,3.5,0.5,4.0,5.0,6.0,7.0,7.5,0.0,1.0,2.0,8.0,9.0,-0.75,-0.5,0.25,0.5,2.0,10.0,11.0,0.1,0.2,0.3,4.0,5.0,6.0,,contact-up-low.csv,,0.25,0.125,0.001"
+            "up,low,up_bottom,low_top,2,1,1.0,2.0,3.0,3.5,0.5,4.0,5.0,6.0,7.0,7.5,0.0,1.0,2.0,8.0,9.0,-0.75,-0.5,0.25,0.5,2.0,10.0,11.0,0.1,0.2,0.3,4.0,5.0,6.0,,contact-up-low.csv,,0.25,0.125,0.001,1.5,3.0,2.0,1.0"
         );
     }
 }

@@ -9,7 +9,7 @@ use crate::output::closing::DIGITS;
 use crate::output::folder::REPORT;
 use crate::output::{
     BodyReport, ForceReport, LEGEND, Mark, ObstacleReport, PairReport, PairResult, Plot, ReactionReport, Report,
-    RunStatus, TensionReport, UNSETTLED, busiest, escape, trimmed,
+    RunStatus, SealReport, TensionReport, UNSETTLED, busiest, escape, trimmed,
 };
 use crate::problem::{Units, label};
 use serde_json::Value;
@@ -275,6 +275,12 @@ impl Page<'_> {
                 pulled.map_or(String::new(), at)
             });
         }
+        if self.report.results().any(|pair| pair.seal.is_some()) {
+            table = table.column(self.stress("#sealing pressure"), |pair| {
+                let held = |s: SealReport| format!("{} at {}", digits(s.sealing_pressure), vector(&s.sealing_at));
+                pair.result.seal.map_or(String::new(), held)
+            });
+        }
         if self.report.pairs.iter().any(|pair| !moved(&pair.result).is_empty()) {
             table = table.column("obstacle or offset", |pair| moved(&pair.result));
         }
@@ -317,6 +323,7 @@ impl Page<'_> {
             .optional(self.force("#normal force"), |row| Some(row.result?.normal_force))
             .optional(self.stress("#mean pressure"), |row| Some(row.result?.mean_pressure))
             .optional(self.stress("#peak pressure"), |row| Some(row.result?.peak_pressure))
+            .optional(self.stress("#sealing pressure"), |row| Some(row.result?.seal?.sealing_pressure))
             .optional(self.extent("#extent in contact"), |row| Some(row.result?.extent.contact()));
         let figure = figure.unwrap_or_default();
         if steps.is_empty() { figure } else { format!("<h2>Load steps</h2>{figure}\n{}", table.html("steps.csv")) }

@@ -69,13 +69,10 @@ impl Surface {
             let array = grid.at_points.iter().find(|array| names.contains(&&*array.name));
             array.map_or(Vec::new(), |array| array.values.clone())
         };
-        // a slip opens nothing
-        let least = |c: f64| (-c).max(0.0);
-        let opening: Vec<f64> = values(&["compression", "area", "length"]).into_iter().map(least).collect();
         Self {
             displacement: values(&["displacement"]).as_chunks().0.to_vec(),
             value: values(&["pressure", "traction"]),
-            opening,
+            opening: values(&["opening"]),
             name: grid.title,
             body,
             points: grid.points,

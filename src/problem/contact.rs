@@ -85,6 +85,13 @@ pub struct ContactSpec {
     pub unload: Option<UnloadSpec>,
     /// stiffness of a bonded layer against slip: traction along the surface over slip
     pub shear: Option<Field>,
+    /// groups inside and outside of a seal, at ends of the contact surface of one body: seal = ["bore", "outside"]
+    ///
+    /// They share edges with the surface, in the plane points. This surface carries the contact points, so that ways
+    /// from one end to the other go along its mesh.
+    #[serde(default, deserialize_with = "seal")]
+    #[schemars(with = "Option<Vec<String>>")]
+    pub seal: Option<[Located<String>; 2]>,
     /// whether the surface `on` is before a rigid obstacle, which is given by the gap
     #[serde(default)]
     pub obstacle: bool,
@@ -163,6 +170,7 @@ impl ContactSpec {
             tension: None,
             unload: None,
             shear: None,
+            seal: None,
             obstacle: false,
             approach: None,
             tilt: None,
@@ -222,7 +230,8 @@ impl ContactSpec {
     pub fn has_points_of(&self, other: &Self) -> bool {
         let of = |spec: &Self| {
             let kinds = [spec.obstacle, spec.is_touching(), spec.preload.is_some()];
-            (spec.table, spec.between.clone(), spec.of.clone(), spec.distance, [spec.angle, spec.edge], kinds)
+            let names = (spec.between.clone(), spec.of.clone(), spec.seal.clone());
+            (spec.table, names, spec.distance, [spec.angle, spec.edge], kinds)
         };
         of(self) == of(other)
     }
@@ -338,7 +347,7 @@ pub enum Overlap {
     Refuse,
 }
 
-compile!(ContactSpec { between, on, of, layer, tension, unload, shear, at, path, reference } else {
+compile!(ContactSpec { between, on, of, layer, tension, unload, shear, seal, at, path, reference } else {
     gap, approach, force, tilt, moment, distance, angle, edge, touching, bond, obstacle, preload, overlap, table, slip
 } then compile_steps);
 
@@ -389,6 +398,10 @@ impl Check for ContactSpec {
             }
             positive("shear", "the stiffness", if shear.is_constant() { shear.number() } else { 1.0 })?;
         }
+        if let Some([first, second]) = self.seal.as_ref().filter(|[first, second]| first == second) {
+            let error = Error::scene(&second.place, format!("a seal between `{}` and itself", first.value));
+            return Err(error.help(SEAL).into());
+        }
         self.distance.map_or(Ok(()), |distance| positive("distance", "the distance", distance))
     }
 }
@@ -424,9 +437,10 @@ impl ContactSpec {
     fn check_keys(&self) -> Result<(), Fault> {
         use Partner::{Nearby, Obstacle, Surface};
         let partner = self.partner();
-        let keys: [(_, _, &[Partner]); 11] = [
+        let keys: [(_, _, &[Partner]); 12] = [
             ("preload", self.preload.is_some(), &[Surface]),
             ("shear", self.shear.is_some(), &[Surface]),
+            ("seal", self.seal.is_some(), &[Surface, Obstacle]),
             ("of", self.of.is_some(), &[Nearby]),
             ("distance", self.distance.is_some(), &[Surface, Nearby]),
             ("angle", self.angle != angle(), &[Surface, Nearby]),
@@ -584,10 +598,25 @@ fn write_between<S: Serializer>(between: &[Located<String>; 2], serializer: S) -
 
 /// Read two names of bodies, or patterns of names.
 fn of<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<[Located<String>; 2]>, D::Error> {
-    let Located { value: names, place } = Located::<Vec<Located<String>>>::deserialize(deserializer)?;
-    let names: [Located<String>; 2] = names.try_into().map_err(|_| {
-        refused(Error::scene(&place, "pairs are of two bodies").help("write of = [\"one_*\", \"other_*\"]"))
-    })?;
-    names.iter().try_for_each(pattern::check).map_err(refused)?;
+    let names = two_names(deserializer, "pairs are of two bodies", "write of = [\"one_*\", \"other_*\"]")?;
     Ok(Some(names.map(|name| Located { value: plain_pattern(&name.value), ..name })))
+}
+
+/// What to write for a seal.
+const SEAL: &str = "name what is on either side of it: seal = [\"bore\", \"outside\"]";
+
+/// Read the groups at both ends of a seal.
+fn seal<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<[Located<String>; 2]>, D::Error> {
+    two_names(deserializer, "a seal is between two groups", SEAL).map(Some)
+}
+
+/// Read two names. `message` and `help` are the error of any other number of them.
+fn two_names<'de, D: Deserializer<'de>>(
+    deserializer: D,
+    message: &str,
+    help: &str,
+) -> Result<[Located<String>; 2], D::Error> {
+    let Located { value: names, place } = Located::<Vec<Located<String>>>::deserialize(deserializer)?;
+    names.iter().try_for_each(pattern::check).map_err(refused)?;
+    names.try_into().map_err(|_| refused(Error::scene(&place, message).help(help)))
 }

@@ -17,11 +17,17 @@ fn extent(measure: Measure, contact: f64, open: f64) -> Extent {
 }
 
 /// Return the compressions of pair `i` beyond those that stay without pressure: a layer that was crushed is open below
-/// these.
+/// these. The sizes of slips, which open nothing, are those of the shear of a bond.
 pub fn beyond_rest(done: &Done, i: usize) -> Vec<f64> {
     let (pair, range) = (&done.model().pairs[i], done.model().range(i));
     let compression = done.outcome.layer.compression[range].iter().enumerate();
-    compression.map(|(point, c)| c - pair.law.rest(point)).collect()
+    let is_slip = done.built.discrete.specs[i].slip.is_some();
+    compression.map(|(point, c)| if is_slip { c.abs() } else { c - pair.law.rest(point) }).collect()
+}
+
+/// Return by how much pair `i` is open at its points.
+pub fn opening(done: &Done, i: usize) -> Vec<f64> {
+    beyond_rest(done, i).into_iter().map(|c| (-c).max(0.0)).collect()
 }
 
 /// Return the size of the contact of pair `i`, and in the plane the points where it begins or ends, in the order of the

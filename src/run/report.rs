@@ -2,7 +2,7 @@
 
 use super::stages::{All, Built, Clock, Done};
 use super::verdict::{self, message};
-use super::{results, warnings};
+use super::{extent, results, warnings};
 use crate::ddm::{Outcome, Row, Status};
 use crate::discretize::{BodyInfo, Discrete};
 use crate::error::Result;
@@ -322,8 +322,9 @@ pub fn surface_displacements(done: &Done, recovered: &All) -> Result<Vec<Vec<[f6
     Ok(displacement)
 }
 
-/// Return the surface of pair `i` with gap, compression, pressure, normal (from side a to side b) and area (length) of
-/// the points, for the shear of a bond slip, traction and its direction, and with the `displacement` of side a.
+/// Return the surface of pair `i` with gap, compression, pressure, opening, normal (from side a to side b) and area
+/// (length) of the points, for the shear of a bond slip, traction and its direction, and with the `displacement` of
+/// side a.
 pub fn contact_surface(name: &str, done: &Done, i: usize, displacement: &[[f64; 3]]) -> UnstructuredGrid {
     let (model, layer) = (done.model(), &done.outcome.layer);
     let (pair, range) = (&model.pairs[i], model.range(i));
@@ -337,6 +338,7 @@ pub fn contact_surface(name: &str, done: &Done, i: usize, displacement: &[[f64; 
             FieldArray::new("gap", 1, pair.gap.clone()),
             FieldArray::new(closing, 1, layer.compression[range.clone()].to_vec()),
             FieldArray::new(force, 1, layer.pressure[range].to_vec()),
+            FieldArray::new("opening", 1, extent::opening(done, i)),
             FieldArray::new(along, 3, pair.normal.as_flattened().to_vec()),
             FieldArray::new(pair.measure.name(), 1, pair.area.clone()),
         ],

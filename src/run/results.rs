@@ -4,7 +4,7 @@
 use super::stages::{All, Built, Done, Recovered};
 use super::{extent, numbered};
 use crate::contact::{ContactPair, moment_in_scene};
-use crate::discretize::{BodyInfo, Discrete, ForceBalance, Obstacle, mean_normal};
+use crate::discretize::{BodyInfo, ContactFacts, Discrete, ForceBalance, Obstacle, mean_normal};
 use crate::error::{Result, few};
 use crate::exchange::all_gather;
 use crate::fem::displacement::{self, Strained};
@@ -14,7 +14,7 @@ use crate::model::{Body, BodySlot, DisplacementField};
 use crate::output::closing::readable;
 use crate::output::{
     BalanceReport, BodyReport, Extent, ForceReport, LargestStress, ObstacleReport, PairResult, ReactionReport,
-    ResultNames, RunStatus, StepReport, TensionReport, sci,
+    ResultNames, RunStatus, SealReport, StepReport, TensionReport, sci,
 };
 use crate::problem::history::History;
 use serde::{Deserialize, Serialize};
@@ -282,16 +282,16 @@ fn largest_pressure(pressure: &[f64]) -> (usize, f64) {
     (peak, if pressure[peak] < 0.0 { 0.0 } else { pressure[peak] })
 }
 
-/// Return the mean pressure of the part in contact, from the forces of the points; zero without contact.
+/// Return the mean pressure of the part in contact, from the forces of the points: those of the compressed part of a
+/// bond; zero without contact.
 fn mean_pressure(force: &[f64], extent: &Extent) -> f64 {
     let pressed = force.iter().fold(0.0, |sum, force| sum + force.max(0.0));
     if extent.contact() > 0.0 { pressed / extent.contact() } else { 0.0 }
 }
 
-/// Return the largest tension of a bonded pair and the largest stretch of its layer; none without a bond.
+/// Return the largest tension of a bonded pair and the largest stretch of its layer.
 fn tension(pair: &ContactPair, compression: &[f64], pressure: &[f64]) -> Option<TensionReport> {
-    let least =
-        (0..pair.len()).min_by(|&q, &r| pressure[q].total_cmp(&pressure[r])).filter(|_| pair.law.is_bonded())?;
+    let least = (0..pair.len()).min_by(|&q, &r| pressure[q].total_cmp(&pressure[r]))?;
     Some(TensionReport {
         peak_tension: (0.0 - pressure[least]).max(0.0),
         peak_tension_at: pair.position[least],
@@ -303,27 +303,30 @@ fn tension(pair: &ContactPair, compression: &[f64], pressure: &[f64]) -> Option<
 pub fn pair(done: &Done, i: usize, approach: Option<f64>) -> PairResult {
     let (model, layer) = (done.model(), &done.outcome.layer);
     let (pair, range) = (&model.pairs[i], model.range(i));
-    let (c, p, force) = (&layer.compression[range.clone()], &layer.pressure[range.clone()], &layer.force[range]);
+    let (shear, force) = (done.built.discrete.specs[i].slip.is_some(), &layer.force[range.clone()]);
+    // slips and tractions along the surface count by their sizes, whichever way they point
+    let sizes = |values: &[f64]| values.iter().map(|v| if shear { v.abs() } else { *v }).collect::<Vec<_>>();
+    let [c, p] = [&layer.compression, &layer.pressure].map(|values| sizes(&values[range.clone()]));
     let sides = done.built.discrete.sides(i);
     let (extent, contact_ends) = extent::of(done, i);
-    let (peak, peak_pressure) = largest_pressure(p);
+    let (peak, peak_pressure) = largest_pressure(&p);
     let elastic = extent::beyond_rest(done, i);
     let closed = || (0..pair.len()).filter(|&q| elastic[q] > 0.0);
-    let opening: Vec<f64> = elastic.iter().map(|c| (-c).max(0.0)).collect();
+    let opening = extent::opening(done, i);
     let [least_gap, largest_gap] = range_of(pair.gap.iter().copied());
     PairResult {
-        shear: done.built.discrete.specs[i].slip.is_some(),
+        shear,
         closed: closed().count(),
         force: sides.map(|side| resultant(force, &pair.resultant[side])),
         moment: sides.map(|side| resultant(force, &pair.moment[side])),
         approach,
         normal_force: force.iter().sum(),
         least_pressure: closed().map(|q| p[q]).reduce(f64::min).unwrap_or(0.0),
-        mean_pressure: mean_pressure(force, &extent),
+        mean_pressure: mean_pressure(&sizes(force), &extent),
         peak_pressure,
         peak_at: pair.position[peak],
-        peak_compression: largest(c),
-        tension: tension(pair, c, p),
+        peak_compression: largest(&c),
+        tension: if pair.law.is_bonded() && !shear { tension(pair, &c, &p) } else { None },
         extent,
         contact_ends,
         gap: [least_gap, mean(&pair.area, &pair.gap), largest_gap],
@@ -331,7 +334,18 @@ pub fn pair(done: &Done, i: usize, approach: Option<f64>) -> PairResult {
         layer_energy: layer.energy[i],
         obstacle: obstacle(done, i),
         offset: offset(done, i),
+        seal: seal(done, i, &p),
     }
+}
+
+/// Return what the seal of pair `i` holds, from the pressures of its points; none without a seal. Tension holds nothing.
+fn seal(done: &Done, i: usize, pressure: &[f64]) -> Option<SealReport> {
+    let ContactFacts { seal, surface, .. } = &done.built.discrete.contacts[i];
+    let seal = seal.as_ref()?;
+    let pressed: Vec<f64> = pressure.iter().map(|p| if *p < 0.0 { 0.0 } else { *p }).collect();
+    let at_points = surface.spread(1, &pressed, 0.0);
+    let weakest = seal.weakest(&at_points)?;
+    Some(SealReport { sealing_pressure: at_points[weakest], sealing_at: surface.points()[weakest] })
 }
 
 /// Return the mean of values with these weights.

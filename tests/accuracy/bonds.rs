@@ -138,3 +138,23 @@ fn the_largest_tension() {
         }
     }
 }
+
+/// A bonded obstacle that turns about the middle presses one half of a stiff block with 0 to K t/2 and pulls the other: the mean pressure is that of the
+/// compressed half, whatever the other carries.
+#[test]
+fn a_bond_that_presses_and_pulls() {
+    let scene = Scene::new(format!(
+        "dimension = 2\nmesh = {{ geo = \"{}\" }}\n[[body]]\nname = \"lower\"\nyoung = 1e10\npoisson = 0\nfix = [{{ on = \"lower_face\", x = 0, y = 0 }}]\n\
+         [[contact]]\non = \"lower_top\"\nobstacle = true\nbond = true\ntilt = 1e-3\nlayer = {{ linear = {{ stiffness = 8e3 }} }}\n",
+        case("patch").with_file_name("patch.geo").display()
+    ));
+    let run = solve_here(&scene, &[]).converged();
+    let near = |key: &str, exact: f64| {
+        let value = run.number(&format!("pairs/0/{key}"));
+        assert!((value - exact).abs() < 1e-5, "{key}: {value}");
+    };
+    for (key, exact) in [("mean_pressure", 2.0), ("peak_pressure", 4.0), ("peak_tension", 4.0), ("normal_force", 0.0)] {
+        near(key, exact);
+    }
+    near("contact_length", 0.5);
+}

@@ -1,6 +1,7 @@
 //! Layers that are unloaded along another curve.
 
 use crate::common::here::{solve_here, try_here};
+use crate::common::vtu::Grid;
 use crate::common::{Scene, case, distance, solve_on};
 
 /// A patch under the pressures 10, 4, 15 and 2, whose layer has the stiffness 1e5.
@@ -157,4 +158,25 @@ fn a_crushed_gasket_is_open() {
     close("opening", run.number("pairs/1/opening/1"), 2e-4, 1e-2);
     // the meshes themselves have not come apart
     assert!(run.number("pairs/1/peak_compression") > 2e-4);
+}
+
+/// Report, fields and page agree on how far a crushed layer is open: an obstacle compresses a layer by d = 2e-3 - 1e-4 x, of which 0.9 d stay when it goes
+/// half of its way back.
+#[test]
+fn fields_of_a_crushed_layer() {
+    let scene = Scene::new(format!(
+        "dimension = 3\nmesh = {{ geo = \"{}\", set = {{ nl = 2, nu = 1 }} }}\n[[body]]\nname = \"lower\"\nyoung = 1e10\npoisson = 0\n\
+         fix = [{{ on = \"lower_bottom\", x = 0, y = 0, z = 0 }}]\n[[contact]]\non = \"lower_top\"\nobstacle = true\napproach = 1e-3\ngap = \"1e-4*x\"\n\
+         layer = {{ linear = {{ stiffness = 1e2 }} }}\nunload = {{ linear = {{ stiffness = 1e3 }} }}\n[method]\nsteps = [2, 1]\n",
+        case("patch-3d").with_file_name("patch-3d.geo").display()
+    ));
+    let run = solve_on(1, &scene, &["--vtu", "--report"]).converged();
+    close("report", run.number("pairs/0/opening/1"), 8.1e-4, 1e-6);
+    let grid = Grid::read(&run.folder.join("contact-lower-obstacle.vtu"));
+    for (x, opening) in grid.points.chunks(3).zip(&grid.arrays["opening"]) {
+        close("field", *opening, 8e-4 + 1e-5 * x[0], 1e-6);
+    }
+    let page = std::fs::read_to_string(run.folder.join("report.html")).expect("a page");
+    let widest = page.split("\"opening\":[0.0,").nth(1).and_then(|rest| rest.split(']').next()).expect("a range");
+    close("page", widest.parse().expect("a number"), 8.1e-4, 1e-6);
 }

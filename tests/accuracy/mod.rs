@@ -10,6 +10,7 @@ mod manufactured;
 mod memory;
 mod obstacles;
 mod preloads;
+mod seals;
 mod shear;
 mod space;
 mod supports;

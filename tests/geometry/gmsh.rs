@@ -40,7 +40,7 @@ fn gmsh_opens_bodies_and_contact_surfaces_with_their_fields() {
                       For v In {0:PostProcessing.NbViews-1}\nPrintf(\"wk %.16g\", View[v].Min);\nPrintf(\"wk %.16g\", View[v].Max);\nEndFor\n";
         let found = gmsh(&run.folder, &files, script);
         let views = found[0] as usize;
-        assert_eq!((views, found.len()), (3 + 3 + 6, 2 + 2 * views), "{found:?}");
+        assert_eq!((views, found.len()), (3 + 3 + 7, 2 + 2 * views), "{found:?}");
         let nodes = |body: usize| run.report["bodies"][body]["nodes"].as_f64().expect("a number");
         assert!(found[1] > nodes(0) + nodes(1), "nodes of all files: {}", found[1]);
         // between the points of high orders Gmsh finds other ends
@@ -50,7 +50,7 @@ fn gmsh_opens_bodies_and_contact_surfaces_with_their_fields() {
         let ends = |view: usize| [found[2 + 2 * view], found[3 + 2 * view]];
         // files by name: contact surface, then bodies in the order of their names
         assert!(files[0].starts_with("contact-") && files[1] == "lower.msh", "{files:?}");
-        let views_of_contact = ["gap", "compression", "pressure", "normal", "length", "displacement"];
+        let views_of_contact = ["gap", "compression", "pressure", "opening", "normal", "length", "displacement"];
         let pressure = views_of_contact.iter().position(|view| *view == "pressure").expect("a view");
         let peak = run.report["pairs"][0]["peak_pressure"].as_f64().expect("a number");
         assert!((ends(pressure)[1] / peak - 1.0).abs() < 1e-6, "{name} {order}: {:?} {peak}", ends(pressure));

@@ -66,7 +66,7 @@ fn with_obstacle(case: &mut Case, random: &mut Random) {
         case.text = case.text.replacen("{ on = \"b1_bottom\", y = 0 }, ", "", 1);
     }
     let bond = if random.chance(0.3) { "bond = true\n" } else { "" };
-    let _ = write!(case.line, " | obstacle {gap} {} {bond}", moves.replace('\n', " "));
+    let _ = write!(case.line, " | obstacle {gap} {} {}", moves.replace('\n', " "), bond.trim_end());
     let _ = writeln!(
         case.text,
         "\n[[contact]]\non = \"b1_bottom\"\nobstacle = true\ngap = \"{depth:e} * ({gap})\"\n{bond}{moves}\nlayer = {{ linear = {{ stiffness = {stiffness:e} }} }}"

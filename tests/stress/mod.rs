@@ -1,6 +1,7 @@
 //! A small part of `scripts/stress`: the default method and Newton's on random scenes, in one process.
 
 mod builder;
+mod crushed;
 mod laws;
 mod mixed;
 mod random;
@@ -29,6 +30,9 @@ const SLENDER: u64 = 100;
 
 /// A series with obstacles, bonds and forces.
 const MIXED: u64 = 1;
+
+/// A series with layers that remember, and bonds that carry shear.
+const CRUSHED: u64 = 1;
 
 /// Runs scenes in the session.
 struct Bench<'s> {
@@ -92,7 +96,11 @@ fn scenes_are_solved_by_default(bench: &Bench) {
         let case = mixed::scene(MIXED, index, Path::new(env!("CARGO_MANIFEST_DIR")));
         judge(format!("mixed {MIXED} {index}"), &["auto"], bench.solve(case, &["auto"]));
     }
-    let advice = "`scripts/stress --seed SEED --only INDEX --keep DIR` writes the scene file, with --wide or --slender of that family";
+    for index in 0..SCENES {
+        let case = crushed::scene(CRUSHED, index, Path::new(env!("CARGO_MANIFEST_DIR")));
+        judge(format!("crushed {CRUSHED} {index}"), &["auto"], bench.solve(case, &["auto"]));
+    }
+    let advice = "`scripts/stress --seed SEED --only INDEX --keep DIR` writes the scene file, with --wide, --slender, --mixed or --crushed of that family";
     assert!(bad.is_empty(), "{advice}\n{}", bad.join("\n"));
 }
 
@@ -142,6 +150,12 @@ fn no_method_claims_what_it_has_not(bench: &Bench) {
     // a soft bond lets nothing resist the rise of both blocks from an obstacle
     let case = mixed::scene(777123, 45, Path::new(env!("CARGO_MANIFEST_DIR")));
     assert_eq!(bench.solve(case, &["auto"]).0[0].1.status, "unbounded");
+    // steps that led in a circle where a crushed layer is stiff, and then soft again: with bodies that yield, and before an obstacle on a face that is held
+    for (seed, index) in [(1795998884, 243), (1795999505, 59)] {
+        let case = crushed::scene(seed, index, Path::new(env!("CARGO_MANIFEST_DIR")));
+        let answer = &bench.solve(case, &["auto"]).0[0].1;
+        assert!(answer.claims && answer.iterations <= 60, "{index}: {} {}", answer.iterations, answer.message);
+    }
     // the residual is met, but a body is not in balance yet: that is neither converged nor rounding
     let answer = &bench.run(1, 123, &["0.6"]).0[0].1;
     assert_eq!(answer.status, "iteration-limit");

@@ -29,8 +29,9 @@ pub struct Recipe {
     pub words: String,
     /// Most iterations; the program's own limit if none.
     pub limit: Option<usize>,
-    /// The key `start`, if it is given.
+    /// The keys `start` and `steps`, if they are given.
     pub start: Option<String>,
+    pub steps: Option<String>,
 }
 
 /// Every method, by the name in the table. `any` is robin with the scene's own gamma.
@@ -47,7 +48,7 @@ impl Recipe {
             "any" => robin(format!("{}", case.gamma)),
             number => robin(number.to_owned()),
         };
-        Self { name: name.to_owned(), words, limit, start: case.start.clone() }
+        Self { name: name.to_owned(), words, limit, start: case.start.clone(), steps: case.steps.clone() }
     }
 
     /// The key `method` of the scene.
@@ -56,9 +57,8 @@ impl Recipe {
         if !self.words.is_empty() {
             parts.push(self.words.clone());
         }
-        if let Some(start) = &self.start {
-            parts.push(format!("start = {start}"));
-        }
+        let given = [("start", &self.start), ("steps", &self.steps)];
+        parts.extend(given.iter().filter_map(|(key, value)| Some(format!("{key} = {}", value.as_ref()?))));
         let limit = self.limit.map_or(String::new(), |limit| format!(", iterations = {limit}"));
         parts.push(format!("stop = {{ residual = {residual:e}{limit} }}"));
         format!("{{ {} }}", parts.join(", "))
@@ -129,7 +129,7 @@ fn attempt(session: &Session, path: &Path, recipe: &Recipe, residual: f64) -> Re
         seconds,
         force: (0..model.pairs.len()).map(|i| model.range(i).map(|q| outcome.layer.force[q]).sum()).collect(),
         pressure: outcome.layer.pressure,
-        claims: outcome.status.is_solved(),
+        claims: outcome.status.is_solved() && done.steps.iter().all(|step| step.status.is_solved()),
         history: outcome.rows.iter().map(|row| format!("{:.1e}/{}", row.residual, row.closed)).collect(),
     })
 }

@@ -72,6 +72,7 @@ fn pressed(index: usize, random: &mut Random, root: &Path) -> Case {
         carried: Some(carried),
         gamma: 0.5,
         start: None,
+        steps: None,
     }
 }
 
@@ -105,6 +106,7 @@ fn groove(index: usize, mut random: Random, root: &Path) -> Case {
         carried: Some(4.0 * pressure),
         gamma: 0.5,
         start: None,
+        steps: None,
     }
 }
 

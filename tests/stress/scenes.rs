@@ -39,6 +39,8 @@ pub struct Case {
     pub gamma: f64,
     /// The key `start` of the method, if it is given.
     pub start: Option<String>,
+    /// The key `steps` of the method, if it is given.
+    pub steps: Option<String>,
 }
 
 /// Mesh of a stack of blocks or of a ring of four: blocks, columns, width, height, elements along each width.
@@ -198,6 +200,7 @@ pub fn scene(seed: u64, index: usize, root: &Path) -> Case {
         carried: statics.then_some(blocks.load * blocks.shape.width),
         gamma: blocks.random.power_of_ten(-2.0, 0.08),
         start: None,
+        steps: None,
         line: blocks.line,
     }
 }

@@ -72,6 +72,7 @@ pub fn scene(seed: u64, index: usize, root: &Path) -> Case {
         carried: None,
         gamma: builder.random.power_of_ten(-2.0, 0.08),
         start: None,
+        steps: None,
     }
 }
 
