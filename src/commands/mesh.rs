@@ -1,6 +1,6 @@
 //! `winkler mesh`: make the mesh of a scene, or find it in the cache, and print what is in it.
 
-use super::shapes::SurfaceFacts;
+use super::shapes::{SurfaceFacts, place};
 use super::{inputs, shapes};
 use crate::discretize::{Verified, find_group, verify};
 use crate::error::{Error, Kind, Result, few};
@@ -9,7 +9,6 @@ use crate::fem::Space;
 use crate::interrupt::Interrupt;
 use crate::linalg::bounds;
 use crate::mesh::{Group, Loaded, Mesh, MeshOrigin};
-use crate::output::closing::readable;
 use crate::output::folder::MARK_OF_MESH;
 use crate::output::terminal::ProgressLine;
 use crate::output::{refuse_foreign, say, write_whole};
@@ -203,7 +202,8 @@ fn in_lines(facts: &MeshFacts) -> String {
         lines.push(format!("  body {name}: {cells} cells, {nodes} nodes, {dofs} dofs"));
     }
     lines.extend(facts.warnings.iter().map(|warning| format!("  warning: {warning}")));
-    let corner = |x: &[f64]| x.iter().map(|&x| readable(x, 4)).collect::<Vec<_>>().join(", ");
+    let sizes = facts.groups.iter().flat_map(|group| group.low.iter().chain(&group.high));
+    let roundoff = f64::EPSILON * sizes.fold(0.0, |most: f64, x| most.max(x.abs()));
     // bodies have lines of their own
     let is_listed = |group: &&GroupFacts| group.dimension < facts.dimension || facts.bodies.is_empty();
     let mut listed: Vec<&GroupFacts> = facts.groups.iter().filter(is_listed).collect();
@@ -211,11 +211,11 @@ fn in_lines(facts: &MeshFacts) -> String {
     listed.sort_by_key(|group| Reverse(group.dimension));
     for group in listed {
         let kind = ["points", "lines", "triangles", "tetrahedra"][group.dimension];
-        let (low, high) = (corner(&group.low), corner(&group.high));
+        let [low, high] = [&group.low, &group.high].map(|corner| place(corner, roundoff));
         let beside =
             if group.bounds.is_empty() { String::new() } else { format!(" of {}", few(&group.bounds).join(", ")) };
         let shape = if group.shape.is_empty() { String::new() } else { format!(", {}", group.shape) };
-        lines.push(format!("  group {}: {} {kind}{beside}{shape}, ({low}) to ({high})", group.name, group.simplices));
+        lines.push(format!("  group {}: {} {kind}{beside}{shape}, {low} to {high}", group.name, group.simplices));
     }
     lines.join("\n")
 }

@@ -1,4 +1,4 @@
-//! The plots of runs: residuals over iterations, pressures along contacts, and forces over approaches.
+//! The plots of runs: residuals over iterations, pressures along contacts, and forces over load steps.
 
 use crate::contact::ContactPair;
 use crate::ddm::Row;
@@ -142,24 +142,37 @@ pub fn unit_words(scene: &Scene) -> UnitWords {
     })
 }
 
-/// Return the plot of the contact force of the `shown` pairs over their approach, if the run has several load steps. A
-/// single curve has no name.
-pub fn approaches(done: &Done, shown: &[usize]) -> Option<Plot> {
-    let (names, steps) = (results::pair_names(&done.built), &done.steps);
-    let curve = |&i: &usize| {
-        let of_step = |step: &StepReport| (step.pairs[i].approach.unwrap_or(f64::NAN), length(step.pairs[i].force[0]));
-        let name = if shown.len() == 1 { "" } else { &names[i] };
-        Series::new(name, steps.iter().map(of_step).collect(), Style::LineMarkers)
-    };
-    let scene = &done.built.scene;
+/// Return the plots of the contact forces of the `shown` pairs, over their approach and over the time, with the names of
+/// their files, if the run has several load steps. A single curve has no name.
+pub fn of_steps(done: &Done, shown: &[usize]) -> Vec<(&'static str, Plot)> {
+    let (scene, names) = (&done.built.scene, results::pair_names(&done.built));
     let (unit, force) = units(scene).map(|units| (units.length, units.force)).unzip();
-    (steps.len() > 1).then(|| Plot {
-        title: scene.title.clone(),
-        x: PlotAxis::linear(label("approach", unit.as_deref())),
-        y: PlotAxis::linear(label("contact force", force.as_deref())),
-        series: shown.iter().map(curve).collect(),
-    })
+    let plot = |axis: String, place: fn(&StepReport, usize) -> f64| {
+        let curve = |&i: &usize| {
+            let of_step = |step: &StepReport| (place(step, i), length(step.pairs[i].force[0]));
+            let name = if shown.len() == 1 { "" } else { &names[i] };
+            Series::new(name, done.steps.iter().map(of_step).collect(), Style::LineMarkers)
+        };
+        Plot {
+            title: scene.title.clone(),
+            x: PlotAxis::linear(axis),
+            y: PlotAxis::linear(label("contact force", force.as_deref())),
+            series: shown.iter().map(curve).collect(),
+        }
+    };
+    if done.steps.len() < 2 {
+        return Vec::new();
+    }
+    let approach = |step: &StepReport, i: usize| step.pairs[i].approach.unwrap_or(f64::NAN);
+    let [over_approach, over_time] = OF_STEPS;
+    vec![
+        (over_approach, plot(label("approach", unit.as_deref()), approach)),
+        (over_time, plot("time".to_owned(), |step, _| step.time)),
+    ]
 }
+
+/// The files of the plots over load steps.
+pub const OF_STEPS: [&str; 2] = ["force-approach.svg", "force-time.svg"];
 
 /// Return the plot of pressures along pair `i` in the units of the scene, with the curve of its reference alone. Among
 /// several pairs each has the names of its surfaces.

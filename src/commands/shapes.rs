@@ -82,7 +82,7 @@ fn shape<const D: usize>(mesh: &Mesh<D>, group: &Group, facets: &[OrientedFacet<
     let points: &[[f64; D]] = &numbers.into_iter().map(|point| mesh.points[point as usize]).collect::<Vec<_>>();
     let [low, high] = crate::linalg::bounds(points.iter().map(|&x| pad(x)));
     let limit = ON_SHAPE * length(minus(high, low));
-    let in_scene = |x: &DVector<f64>| vector(&(0..D).map(|c| x[c] + mesh.datum[c]).collect::<Vec<_>>());
+    let in_scene = |x: &DVector<f64>| place(&(0..D).map(|c| x[c] + mesh.datum[c]).collect::<Vec<_>>(), limit);
     // a hole has its normals towards the centre or the axis
     let side = |from: &dyn Fn(&DVector<f64>) -> DVector<f64>| {
         let outward = |facet: &OrientedFacet<D>| facet.area * from(&column(facet.centre)).dot(&column(facet.normal));
@@ -127,8 +127,8 @@ fn column<const D: usize>(x: [f64; D]) -> DVector<f64> {
     DVector::from_row_slice(&x)
 }
 
-fn middle<const D: usize>(points: &[[f64; D]]) -> DVector<f64> {
-    points.iter().map(|&x| column(x)).sum::<DVector<f64>>() / points.len() as f64
+fn middle(points: &[DVector<f64>]) -> DVector<f64> {
+    points.iter().sum::<DVector<f64>>() / points.len() as f64
 }
 
 /// A circle or a sphere.
@@ -138,17 +138,28 @@ struct Ball {
 }
 
 impl Ball {
-    /// Return the one through these points, from the equations x.x = 2 c.x + r^2 - c.c; `None` if a point is beside it.
+    /// Return the one through these points; `None` if a point is beside it.
     fn through<const D: usize>(points: &[[f64; D]], limit: f64) -> Option<Self> {
-        let middle = middle(points);
-        let apart: Vec<DVector<f64>> = points.iter().map(|&x| column(x) - &middle).collect();
-        let rows = DMatrix::from_fn(points.len(), D + 1, |i, c| if c < D { 2.0 * apart[i][c] } else { 1.0 });
-        let squares = DVector::from_iterator(points.len(), apart.iter().map(|x| x.norm_squared()));
-        let found = rows.try_svd(true, true, f64::EPSILON, SWEEPS)?.solve(&squares, f64::EPSILON).ok()?;
-        let centre = found.rows(0, D).into_owned();
-        let radius = (found[D] + centre.norm_squared()).sqrt();
-        let is_on = apart.iter().all(|x| ((x - &centre).norm() - radius).abs() <= limit);
-        (points.len() > D + 1 && is_on).then(|| Self { centre: centre + middle, radius })
+        let points: Vec<_> = points.iter().map(|&x| column(x)).collect();
+        let found = Self::nearest(&points)?;
+        let is_on = points.iter().all(|x| ((x - &found.centre).norm() - found.radius).abs() <= limit);
+        (points.len() > D + 1 && is_on).then_some(found)
+    }
+
+    /// Return the one that is nearest to these points, from the equations x.x = 2 c.x + r^2 - c.c by least squares.
+    fn nearest(points: &[DVector<f64>]) -> Option<Self> {
+        let (dimension, middle) = (points[0].len(), middle(points));
+        let apart: Vec<DVector<f64>> = points.iter().map(|x| x - &middle).collect();
+        let size = apart.iter().map(|x| x.amax()).fold(0.0, f64::max);
+        let rows =
+            DMatrix::from_fn(points.len(), dimension + 1, |i, c| if c < dimension { apart[i][c] / size } else { 1.0 });
+        let squares = DVector::from_iterator(points.len(), apart.iter().map(|x| x.norm_squared() / size));
+        let parts = rows.try_svd(true, true, f64::EPSILON, SWEEPS)?;
+        // points in a plane leave the place across it free
+        let found = parts.solve(&squares, TOLERANCE * parts.singular_values.max()).ok()?;
+        let centre = 0.5 * found.rows(0, dimension);
+        let radius = (found[dimension] * size + centre.norm_squared()).sqrt();
+        Some(Self { centre: centre + middle, radius })
     }
 }
 
@@ -167,10 +178,14 @@ impl Turned {
     fn through<const D: usize>(points: &[[f64; D]], spread: DMatrix<f64>, limit: f64) -> Option<Self> {
         let eigen = SymmetricEigen::try_new(spread, f64::EPSILON, SWEEPS)?;
         let axis = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
-        let (size, middle) = (limit / ON_SHAPE, middle(points));
+        let points: Vec<_> = points.iter().map(|&x| column(x)).collect();
+        let (size, middle) = (limit / ON_SHAPE, middle(&points));
         // lengths are shares of the size, so that all parameters count alike
-        let points: Vec<DVector<f64>> = points.iter().map(|&x| (column(x) - &middle) / size).collect();
-        let mut found = Self { centre: DVector::zeros(D), axis, radius: 0.5, slope: 0.0 };
+        let points: Vec<_> = points.iter().map(|x| (x - &middle) / size).collect();
+        // seen along its axis a cylinder is a circle, and a cone a ring about one
+        let seen: Vec<_> = points.iter().map(|x| x - x.dot(&axis) * &axis).collect();
+        let Ball { centre, radius } = Ball::nearest(&seen)?;
+        let mut found = Self { centre, axis, radius, slope: 0.0 };
         for _ in 0..STEPS {
             let step = found.step(&points)?;
             found.centre -= step.rows(0, D);
@@ -227,8 +242,13 @@ const STEPS: usize = 10;
 /// axis makes its entries no numbers.
 const SWEEPS: usize = 1000;
 
-/// Return a vector in words, without its roundoff.
+/// Return a unit vector in words, without its roundoff.
 fn vector(v: &[f64]) -> String {
-    let rounded = |x: &f64| readable((x * 1e6).round() / 1e6 + 0.0, 4);
-    format!("({})", v.iter().map(rounded).collect::<Vec<_>>().join(", "))
+    place(v, ON_SHAPE)
+}
+
+/// Return a place in words; coordinates up to `roundoff` are zero.
+pub fn place(x: &[f64], roundoff: f64) -> String {
+    let words = |&x: &f64| readable(if x.abs() <= roundoff { 0.0 } else { x }, 4);
+    format!("({})", x.iter().map(words).collect::<Vec<_>>().join(", "))
 }

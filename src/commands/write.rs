@@ -102,8 +102,8 @@ impl ResultFiles<'_> {
             return Ok(());
         }
         plots.write(folder)?;
-        let approaches = plots::approaches(done, shown);
-        approaches.map_or(Ok(()), |plot| folder.write("force-approach.svg", |out| plot.write(out)))
+        let of_steps = plots::of_steps(done, shown).into_iter();
+        of_steps.map(|(file, plot)| folder.write(file, |out| plot.write(out))).collect()
     }
 
     /// Write the page with the surfaces of the bodies of all ranks. Collective.
@@ -138,7 +138,7 @@ impl ResultFiles<'_> {
                 })
                 .collect(),
             pressures: plots.pressures().collect(),
-            approach: plots::approaches(done, shown),
+            of_steps: plots::of_steps(done, shown),
             convergence: (!done.outcome.rows.is_empty()).then(|| plots.convergence()),
         };
         let html = page.html();
@@ -209,7 +209,8 @@ pub fn planned(scene: &Scene) -> Vec<String> {
         (steps > 0, "steps.csv"),
         (output.plots, "convergence.svg"),
         (output.plots && is_plane, "pressure.svg"),
-        (output.plots && steps > 1, "force-approach.svg"),
+        (output.plots && steps > 1, plots::OF_STEPS[0]),
+        (output.plots && steps > 1, plots::OF_STEPS[1]),
         (output.report, page::FILE),
         (output.vtu, COLLECTION),
         (scene.adapt.is_some(), ADAPTED),

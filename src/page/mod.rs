@@ -38,8 +38,8 @@ pub struct Page<'a> {
     pub contacts: Vec<Surface>,
     /// Pressures along contacts in the plane.
     pub pressures: Vec<&'a Plot>,
-    /// Contact forces over approaches, if there are load steps.
-    pub approach: Option<Plot>,
+    /// Contact forces over load steps, by their files, if there are several.
+    pub of_steps: Vec<(&'static str, Plot)>,
     /// Residuals and errors over the iterations, if there are any.
     pub convergence: Option<Plot>,
 }
@@ -149,7 +149,9 @@ impl Page<'_> {
         let report = self.report;
         let is_space = report.settings["dimension"] == 3;
         let figure = |plot: &Plot| format!("<figure class=\"plot\">{}</figure>", plot.svg());
-        let figures: String = self.pressures.iter().copied().map(figure).collect();
+        let figures = |plots: &mut dyn Iterator<Item = &Plot>| {
+            format!("<div class=\"figures\">{}</div>", plots.map(figure).collect::<String>())
+        };
         let convergence = self.convergence.as_ref().map(figure);
         let view = surface::view(&self.bodies, &self.contacts, self.marks, is_space).to_string();
         format!(
@@ -168,9 +170,9 @@ impl Page<'_> {
             fields = self.fields(),
             section = if is_space { SECTION } else { "" },
             names = names(&self.bodies),
-            pressures = format_args!("<div class=\"figures\">{figures}</div>"),
+            pressures = figures(&mut self.pressures.iter().copied()),
             contacts = self.contact_table(),
-            steps = self.step_table(self.approach.as_ref().map(figure)),
+            steps = self.step_table(&figures(&mut self.of_steps.iter().map(|(_, plot)| plot))),
             meshes = self.mesh_table(),
             convergence = convergence.unwrap_or_else(|| "<p>No iterations.</p>".to_owned()),
             scene = scene(&report.settings),
@@ -290,9 +292,8 @@ impl Page<'_> {
         table.html("contacts.csv")
     }
 
-    /// Return the load steps: the `figure` of forces over approaches, and a table of each pair and reaction by step;
-    /// empty without any.
-    fn step_table(&self, figure: Option<String>) -> String {
+    /// Return the load steps: the `figures` of forces, and a table of each pair and reaction by step; empty without any.
+    fn step_table(&self, figures: &str) -> String {
         let (pairs, steps) = (&self.report.pairs, &self.report.steps);
         let mut rows: Vec<StepRow> = Vec::new();
         for (i, pair) in pairs.iter().enumerate() {
@@ -321,12 +322,16 @@ impl Page<'_> {
             .column("factors", factors)
             .column(self.force("force"), |row| vector(&row.force))
             .optional(self.force("#normal force"), |row| Some(row.result?.normal_force))
+            .optional(self.stress("#least pressure"), |row| Some(row.result?.least_pressure))
             .optional(self.stress("#mean pressure"), |row| Some(row.result?.mean_pressure))
             .optional(self.stress("#peak pressure"), |row| Some(row.result?.peak_pressure))
             .optional(self.stress("#sealing pressure"), |row| Some(row.result?.seal?.sealing_pressure))
             .optional(self.extent("#extent in contact"), |row| Some(row.result?.extent.contact()));
-        let figure = figure.unwrap_or_default();
-        if steps.is_empty() { figure } else { format!("<h2>Load steps</h2>{figure}\n{}", table.html("steps.csv")) }
+        if steps.is_empty() {
+            String::new()
+        } else {
+            format!("<h2>Load steps</h2>{figures}\n{}", table.html("steps.csv"))
+        }
     }
 
     /// Return the table of adapted meshes with their estimated errors, empty without any.

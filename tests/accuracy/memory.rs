@@ -54,6 +54,26 @@ fn loading_and_unloading_by_hand() {
     }
 }
 
+/// A layer that is crushed beyond the end of its table goes on along the last slope, also where it comes back to after it was unloaded. The warning names
+/// the end of the table.
+#[test]
+fn crushed_beyond_the_table() {
+    let sets = [
+        LOADS[0],
+        "contact.0.layer={table=[[5e-5,5],[1e-4,10]]}",
+        "contact.0.unload={linear={stiffness=1e6}}",
+        "method={steps=[6,2,7.5,1]}",
+    ];
+    let run = solve_here(case("patch"), &sets).converged();
+    for (step, exact) in [1.2e-4, 1.2e-4 - 8.0 / 1e6, 1.5e-4, 1.5e-4 - 13.0 / 1e6].into_iter().enumerate() {
+        let found = run.number(&format!("steps/{step}/pairs/0/peak_compression"));
+        close(&format!("step {step}"), found, exact, 1e-10);
+    }
+    let words =
+        "by 1.50e-04 in load step 3, under a pressure of 1.50e+01, and its law ends at a compression of 1.00e-04";
+    assert!(run.warnings().contains(words), "{}", run.warnings());
+}
+
 /// A wave is crushed by a pressure of 80, so that its points have compressions of their own.
 fn wave(steps: &str) -> Vec<String> {
     let layer = "contact.0.layer={power={B=2.5e-5,a=0.5}}".to_owned();

@@ -583,4 +583,10 @@ fn shapes_of_surfaces() {
     ] {
         assert!(plane.contains(words), "{words} in\n{plane}");
     }
+    // a strip whose points are far from the circle around their middle
+    let sector = listed(
+        "Cylinder(1) = {250, 0, 0, 0, 0, 3, 51, Pi/4}; Mesh.MeshSizeMax = 5; Physical Volume(\"sector\") = {1}; Physical Surface(\"rim\") = {1};",
+    );
+    let rim = "of sector, cylinder of radius 51.0000 about (0.0000, 0.0000, 1.0000) through (250.0000, 0.0000,";
+    assert!(sector.contains(rim), "{sector}");
 }

@@ -84,7 +84,7 @@ fn a_step_of_a_path_is_a_run_with_its_loads() {
         let force = &table["force_y lower-upper"];
         near(force[1], force[5], 4e-5, "half the load");
         near(force[2], force[6], 4e-5, "the full load");
-        assert!(run.folder.join("force-approach.svg").is_file());
+        assert!(["force-approach.svg", "force-time.svg"].iter().all(|plot| run.folder.join(plot).is_file()));
     }
 }
 

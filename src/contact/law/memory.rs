@@ -11,7 +11,7 @@
 //! 0 or more if q(m) >= p_m; softer unloading is refused.
 
 use super::forms::Power;
-use super::{Law, LayerLaw, PerPoint, extended};
+use super::{Law, LayerLaw, PerPoint, extended, extended_energy};
 use crate::error::{Error, Kind, Result};
 use std::rc::Rc;
 
@@ -121,7 +121,7 @@ impl LayerLaw for Memory {
     fn pressure_and_tangent(&self, point: usize, c: f64) -> (f64, f64) {
         let Some(PointMemory { largest, pressure, fall }) = self.points[point].filter(|memory| c < memory.largest)
         else {
-            return self.loading.pressure_and_tangent(point, c);
+            return extended(&*self.loading, point, c);
         };
         if largest - c >= fall {
             return (0.0, 0.0);
@@ -131,16 +131,15 @@ impl LayerLaw for Memory {
     }
 
     fn energy(&self, point: usize, c: f64) -> f64 {
-        let Some(memory) = self.points[point] else { return self.loading.energy(point, c) };
+        let loaded = |c: f64| extended_energy(&*self.loading, point, c);
+        let Some(memory) = self.points[point] else { return loaded(c) };
         let largest = memory.largest;
         let unloaded = self.unloaded_energy(point, memory, (largest - c).max(0.0));
-        let beyond =
-            if c > largest { self.loading.energy(point, c) - self.loading.energy(point, largest) } else { 0.0 };
-        unloaded + beyond
+        unloaded + if c > largest { loaded(c) - loaded(largest) } else { 0.0 }
     }
 
-    fn end(&self, point: usize) -> f64 {
-        self.loading.end(point).max(self.points[point].map_or(0.0, |memory| memory.largest))
+    fn given(&self, point: usize) -> f64 {
+        self.loading.given(point)
     }
 
     fn rest(&self, point: usize) -> f64 {

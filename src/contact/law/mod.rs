@@ -43,6 +43,12 @@ pub trait LayerLaw: std::fmt::Debug {
         f64::INFINITY
     }
 
+    /// Return the compression up to which the user has given the law: its end, or that of the law that a layer which
+    /// remembers goes on along.
+    fn given(&self, point: usize) -> f64 {
+        self.end(point)
+    }
+
     /// Return the compression up to which there is no pressure: 0, or more where a layer stays compressed.
     fn rest(&self, _point: usize) -> f64 {
         0.0
@@ -140,7 +146,7 @@ impl Law {
 
     /// Return the compression up to which the law is given at a point, infinite if it has no end.
     pub fn end(&self, point: usize) -> f64 {
-        self.compression.end(point)
+        self.compression.given(point)
     }
 
     /// Return the stretch up to which the law of a bonded layer is given, in the same way.
@@ -167,13 +173,7 @@ impl Law {
     /// Return P(c), the integral of p from 0 to any compression.
     pub fn energy(&self, point: usize, c: f64) -> f64 {
         let Some((law, sign)) = self.side(c).filter(|_| c != 0.0) else { return 0.0 };
-        let (c, end) = (sign * c, law.end(point));
-        if c > end {
-            let (pressure, tangent) = law.pressure_and_tangent(point, end);
-            law.energy(point, end) + (c - end) * (pressure + 0.5 * tangent * (c - end))
-        } else {
-            law.energy(point, c)
-        }
+        extended_energy(law, point, sign * c)
     }
 
     /// Return g'(-c) of (38), the tangent of the paper's law g, which continues into tension as an odd function. Where
@@ -315,6 +315,17 @@ fn extended(law: &dyn LayerLaw, point: usize, c: f64) -> (f64, f64) {
         (pressure + tangent * (c - end), tangent)
     } else {
         law.pressure_and_tangent(point, c)
+    }
+}
+
+/// Return P(c), the integral of the pressure of [`extended`].
+fn extended_energy(law: &dyn LayerLaw, point: usize, c: f64) -> f64 {
+    let end = law.end(point);
+    if c > end {
+        let (pressure, tangent) = law.pressure_and_tangent(point, end);
+        law.energy(point, end) + (c - end) * (pressure + 0.5 * tangent * (c - end))
+    } else {
+        law.energy(point, c)
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod bearing;
 mod flange;
+mod gasket;
 mod hertz;
 mod ring;
 mod rough;
