@@ -64,7 +64,7 @@ pub fn stiffer_than_diamond(scene: &Scene) -> Option<String> {
     Some(format!(
         "young = {} of `{}` is more than diamond has, {} {}: is it in the units of the scene?",
         sci(young, 1),
-        body.name,
+        body.name.value,
         sci(DIAMOND / pascals, 1),
         units.stress
     ))
