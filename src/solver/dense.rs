@@ -10,6 +10,7 @@ pub struct Dense {
     rows: usize,
     /// All entries of G, row by row.
     values: Vec<f64>,
+    /// Its factor; empty before the first factorisation.
     factor: Vec<f64>,
     /// Whether G was positive definite when it was factored; `None` if it has not been factored since the last change.
     made: Option<bool>,
@@ -20,7 +21,7 @@ impl Dense {
     /// Make the solver of a symmetric matrix with all entries stored.
     pub fn make(matrix: Rows) -> Result<Box<dyn InnerSolver>> {
         let (rows, values) = (matrix.own().len(), matrix.into_values());
-        Ok(Box::new(Self { rows, factor: vec![0.0; values.len()], values, made: None, factorizations: 0 }))
+        Ok(Box::new(Self { rows, values, factor: Vec::new(), made: None, factorizations: 0 }))
     }
 }
 
@@ -46,7 +47,7 @@ impl InnerSolver for Dense {
     fn set_up(&mut self) -> Result<()> {
         if self.made.is_none() {
             self.factorizations += 1;
-            self.factor.copy_from_slice(&self.values);
+            self.factor.clone_from(&self.values);
             self.made = Some(cholesky(&mut self.factor, self.rows)?);
         }
         Ok(())
