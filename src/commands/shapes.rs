@@ -165,6 +165,7 @@ impl Ball {
 
 /// A cylinder or a cone: the distance from the axis is `radius + slope t` at the place t along the axis from the
 /// centre.
+#[derive(Clone)]
 struct Turned {
     centre: DVector<f64>,
     axis: DVector<f64>,
@@ -173,36 +174,52 @@ struct Turned {
 }
 
 impl Turned {
-    /// Return the one through these points by Gauss-Newton steps; `None` if a point is beside it. The normals of a
-    /// cylinder or a cone vary least along its axis, by their `spread`.
+    /// Return the one through these points; `None` if a point is beside it. Its axis is near one of the principal axes of
+    /// the `spread` of its normals: near that of the least spread, unless facets are few.
     fn through<const D: usize>(points: &[[f64; D]], spread: DMatrix<f64>, limit: f64) -> Option<Self> {
-        let eigen = SymmetricEigen::try_new(spread, f64::EPSILON, SWEEPS)?;
-        let axis = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
+        let axes = SymmetricEigen::try_new(spread, f64::EPSILON, SWEEPS)?.eigenvectors;
         let points: Vec<_> = points.iter().map(|&x| column(x)).collect();
         let (size, middle) = (limit / ON_SHAPE, middle(&points));
         // lengths are shares of the size, so that all parameters count alike
         let points: Vec<_> = points.iter().map(|x| (x - &middle) / size).collect();
-        // seen along its axis a cylinder is a circle, and a cone a ring about one
-        let seen: Vec<_> = points.iter().map(|x| x - x.dot(&axis) * &axis).collect();
-        let Ball { centre, radius } = Ball::nearest(&seen)?;
-        let mut found = Self { centre, axis, radius, slope: 0.0 };
-        for _ in 0..STEPS {
-            let step = found.step(&points)?;
-            found.centre -= step.rows(0, D);
-            found.axis = (found.axis - step.rows(D, D)).normalize();
-            found.radius -= step[2 * D];
-            found.slope -= step[2 * D + 1];
-        }
-        let is_on = points.iter().all(|x| found.error(x).abs() <= ON_SHAPE);
-        is_on.then(|| Self { centre: size * &found.centre + middle, radius: size * found.radius, ..found })
+        let about = |axis: DVector<f64>| {
+            // seen along its axis a cylinder is a circle, and a cone a ring about one
+            let seen: Vec<_> = points.iter().map(|x| x - x.dot(&axis) * &axis).collect();
+            let Ball { centre, radius } = Ball::nearest(&seen)?;
+            let start = Self { centre, axis, radius, slope: 0.0 };
+            start.clone().fit(&points, false).or_else(|| start.fit(&points, true))
+        };
+        let found = axes.column_iter().find_map(|axis| about(axis.into_owned()))?;
+        Some(Self { centre: size * &found.centre + middle, radius: size * found.radius, ..found })
     }
 
-    /// Return the Gauss-Newton step of centre, axis, radius and slope.
-    fn step(&self, points: &[DVector<f64>]) -> Option<DVector<f64>> {
+    /// Move it nearer to the points by Gauss-Newton steps, as a cylinder or as a cone; `None` if a point stays beside it.
+    fn fit(mut self, points: &[DVector<f64>], is_cone: bool) -> Option<Self> {
+        let d = self.axis.len();
+        for _ in 0..STEPS {
+            let step = self.step(points, is_cone)?;
+            self.centre -= step.rows(0, d);
+            self.axis = (self.axis - step.rows(d, d)).normalize();
+            self.radius -= step[2 * d];
+            self.slope -= step[2 * d + 1];
+            // the centre stays beside the middle of the points
+            let along = self.centre.dot(&self.axis);
+            self.centre -= along * &self.axis;
+            self.radius -= self.slope * along;
+        }
+        points.iter().all(|x| self.error(x).abs() <= ON_SHAPE).then_some(self)
+    }
+
+    /// Return the Gauss-Newton step of centre, axis, radius and, of a cone, slope. On a narrow strip a slope and a turn of
+    /// the axis are nearly the same.
+    fn step(&self, points: &[DVector<f64>], is_cone: bool) -> Option<DVector<f64>> {
         let count = 2 * self.axis.len() + 2;
         let (mut products, mut right) = (DMatrix::zeros(count, count), DVector::zeros(count));
         for x in points {
-            let row = self.derivatives(x);
+            let mut row = self.derivatives(x);
+            if !is_cone {
+                row[count - 1] = 0.0;
+            }
             products.ger(1.0, &row, &row, 1.0);
             right.axpy(self.error(x), &row, 1.0);
         }
@@ -235,7 +252,7 @@ impl Turned {
 }
 
 /// Gauss-Newton steps. Four reach the last digit on the cylinders and cones of the test, from the axis that their facets
-/// give; a surface that is no such shape costs the others in vain.
+/// give; a surface that is no such shape costs all of each start in vain.
 const STEPS: usize = 10;
 
 /// Most sweeps of a decomposition of eight unknowns, which takes some dozens, and would not end where a point on the

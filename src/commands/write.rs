@@ -102,8 +102,8 @@ impl ResultFiles<'_> {
             return Ok(());
         }
         plots.write(folder)?;
-        let of_steps = plots::of_steps(done, shown).into_iter();
-        of_steps.map(|(file, plot)| folder.write(file, |out| plot.write(out))).collect()
+        let mut of_steps = plots::of_steps(done, shown).into_iter();
+        of_steps.try_for_each(|(file, plot)| folder.write(file, |out| plot.write(out)))
     }
 
     /// Write the page with the surfaces of the bodies of all ranks. Collective.
