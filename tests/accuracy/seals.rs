@@ -59,7 +59,7 @@ fn the_ridge_of_a_ring() {
     let text = |file: &str| fs::read_to_string(run.folder.join(file)).expect("a table");
     assert!(text("contacts.csv").contains(",sealing_pressure,sealing_x,sealing_y,sealing_z\n"));
     assert!(text("steps.csv").contains(",sealing_pressure ring-obstacle,sealing_x ring-obstacle,"));
-    assert!(run.stdout.contains(", sealing pressure 1 at (-1.5, "), "{}", run.said());
+    assert!(run.stdout.contains(", sealing pressure 1.000000 at (-1.5"), "{}", run.said());
     check(&solve_on(3, ring(), &[]).converged(), 1e-6);
     check(&solve_here(ring(), &["mesh.set.arcs=2"]).converged(), 1e-6);
     check(&solve_here(ring(), &["contact.0.seal=['outer_rim', 'inner_rim']"]).converged(), 1e-6);
