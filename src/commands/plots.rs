@@ -142,8 +142,8 @@ pub fn unit_words(scene: &Scene) -> UnitWords {
     })
 }
 
-/// Return the plots of the contact forces of the `shown` pairs, over their approach and over the time, with the names of
-/// their files, if the run has several load steps. A single curve has no name.
+/// Return the plots of the contact forces of the `shown` pairs, over their approach and over the time, with the names
+/// of their files, if the run has several load steps. A single curve has no name.
 pub fn of_steps(done: &Done, shown: &[usize]) -> Vec<(&'static str, Plot)> {
     let (scene, names) = (&done.built.scene, results::pair_names(&done.built));
     let (unit, force) = units(scene).map(|units| (units.length, units.force)).unzip();

@@ -174,8 +174,8 @@ struct Turned {
 }
 
 impl Turned {
-    /// Return the one through these points; `None` if a point is beside it. Its axis is near one of the principal axes of
-    /// the `spread` of its normals: near that of the least spread, unless facets are few.
+    /// Return the one through these points; `None` if a point is beside it. Its axis is near one of the principal
+    /// axes of the `spread` of its normals: near that of the least spread, unless facets are few.
     fn through<const D: usize>(points: &[[f64; D]], spread: DMatrix<f64>, limit: f64) -> Option<Self> {
         let axes = SymmetricEigen::try_new(spread, f64::EPSILON, SWEEPS)?.eigenvectors;
         let points: Vec<_> = points.iter().map(|&x| column(x)).collect();
@@ -193,7 +193,8 @@ impl Turned {
         Some(Self { centre: size * &found.centre + middle, radius: size * found.radius, ..found })
     }
 
-    /// Move it nearer to the points by Gauss-Newton steps, as a cylinder or as a cone; `None` if a point stays beside it.
+    /// Move it nearer to the points by Gauss-Newton steps, as a cylinder or as a cone; `None` if a point stays beside
+    /// it.
     fn fit(mut self, points: &[DVector<f64>], is_cone: bool) -> Option<Self> {
         let d = self.axis.len();
         for _ in 0..STEPS {
@@ -210,8 +211,8 @@ impl Turned {
         points.iter().all(|x| self.error(x).abs() <= ON_SHAPE).then_some(self)
     }
 
-    /// Return the Gauss-Newton step of centre, axis, radius and, of a cone, slope. On a narrow strip a slope and a turn of
-    /// the axis are nearly the same.
+    /// Return the Gauss-Newton step of centre, axis, radius and, of a cone, slope. On a narrow strip a slope and a
+    /// turn of the axis are nearly the same.
     fn step(&self, points: &[DVector<f64>], is_cone: bool) -> Option<DVector<f64>> {
         let count = 2 * self.axis.len() + 2;
         let (mut products, mut right) = (DMatrix::zeros(count, count), DVector::zeros(count));
@@ -251,8 +252,8 @@ impl Turned {
     }
 }
 
-/// Gauss-Newton steps. Four reach the last digit on the cylinders and cones of the test, from the axis that their facets
-/// give; a surface that is no such shape costs all of each start in vain.
+/// Gauss-Newton steps. Four reach the last digit on the cylinders and cones of the test, from the axis that their
+/// facets give; a surface that is no such shape costs all of each start in vain.
 const STEPS: usize = 10;
 
 /// Most sweeps of a decomposition of eight unknowns, which takes some dozens, and would not end where a point on the

@@ -108,8 +108,8 @@ pub(super) fn roundoff(f1: f64) -> f64 {
 /// Each step is measured by itself, by the squared distance from the laws at its end over that at its beginning:
 /// earlier steps had other slopes. Far from the solution this distance falls while the error may rise by many orders.
 /// Where a contact peels point by point, F1 alone falls ([`falls`]), and what reaches a new least F1 cannot repeat
-/// itself. A step to an iterate that was there before, by its error and F1, is part of a circle. Where the square of the error, in the energy norm, is below [`EXACT`], the solution is near: a distance that
-/// falls is roundoff there.
+/// itself. A step to an iterate that was there before, by its error and F1, is part of a circle. Where the square of
+/// the error, in the energy norm, is below [`EXACT`], the solution is near: a distance that falls is roundoff there.
 #[derive(Debug, Clone)]
 pub(super) struct Stagnation {
     /// The error at the last progress in it.

@@ -145,8 +145,8 @@ impl ContactSurface {
     }
 }
 
-/// Return the corners of a facet or edge as sorted points of the mesh. A facet in space has three; in place of those that
-/// others lack there is no point.
+/// Return the corners of a facet or edge as sorted points of the mesh. A facet in space has three; in place of those
+/// that others lack there is no point.
 pub fn corners(points: impl Iterator<Item = u32>) -> [u32; 3] {
     let mut corners = [u32::MAX; 3];
     corners.iter_mut().zip(points).for_each(|(corner, point)| *corner = point);

@@ -2,9 +2,9 @@
 //!
 //! A fluid of the pressure s passes where the contact pressure is below s. It is held if the contact pressure reaches s
 //! somewhere on every way along the surface from one end to the other. The largest such s, the sealing pressure, is the
-//! least over all ways of the largest contact pressure on the way. Pressures are linear between the points of the mesh of
-//! the surface. Two points with pressures below s that a way below s joins are then joined by such a way along edges, so
-//! that edges are enough.
+//! least over all ways of the largest contact pressure on the way. Pressures are linear between the points of the
+//! mesh of the surface. Two points with pressures below s that a way below s joins are then joined by such a way
+//! along edges, so that edges are enough.
 
 use super::contact_surface::{ContactSurface, corners, places};
 use super::groups::find_group;
@@ -169,8 +169,8 @@ fn rims<const D: usize>(of: &[u32]) -> impl Iterator<Item = [u32; 3]> {
     left_out.map(move |left| corners(of.iter().enumerate().filter(|(k, _)| *k != left).map(|(_, &point)| point)))
 }
 
-/// Return the edges of the mesh of a surface, whose facets have these points: those of the simplices into which the points of
-/// a facet cut it, and those between the points that a node at an edge of the surface has on each face.
+/// Return the edges of the mesh of a surface, whose facets have these points: those of the simplices into which the
+/// points of a facet cut it, and those between the points that a node at an edge of the surface has on each face.
 fn edges<const D: usize>(side: &Side<D>, points: &[u32]) -> Vec<[u32; 2]> {
     let (places, stride) = (places::<D>(side.facets.order), side.facets.stride);
     // neighbours differ by one step in two of the coordinates, others by more steps in one

@@ -292,7 +292,8 @@ impl Page<'_> {
         table.html("contacts.csv")
     }
 
-    /// Return the load steps: the `figures` of forces, and a table of each pair and reaction by step; empty without any.
+    /// Return the load steps: the `figures` of forces, and a table of each pair and reaction by step; empty without
+    /// any.
     fn step_table(&self, figures: &str) -> String {
         let (pairs, steps) = (&self.report.pairs, &self.report.steps);
         let mut rows: Vec<StepRow> = Vec::new();

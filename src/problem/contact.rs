@@ -257,8 +257,8 @@ impl ContactSpec {
         self.given().chain([&self.gap]).flat_map(Field::factors)
     }
 
-    /// Give forces and motions their values in a load step, and the gap its factors. Numbers are multiplied by the factor
-    /// of the contact's `own` path. An expression has the factors that it names, and no other.
+    /// Give forces and motions their values in a load step, and the gap its factors. Numbers are multiplied by the
+    /// factor of the contact's `own` path. An expression has the factors that it names, and no other.
     pub fn set_step(&mut self, factors: &[f64], own: f64) {
         let turns = [&mut self.tilt, &mut self.moment].into_iter().flatten().flat_map(OneOrVector::fields_mut);
         let given = [&mut self.approach, &mut self.force].into_iter().flatten().chain(turns);

@@ -124,8 +124,8 @@ impl History {
 }
 
 impl History {
-    /// Return the factor of the forces and motions of a contact at a step. That of a preload without a path is 1 in every
-    /// step.
+    /// Return the factor of the forces and motions of a contact at a step. That of a preload without a path is 1 in
+    /// every step.
     fn contact_factor(&self, step: usize, contact: &ContactSpec) -> f64 {
         match contact.path.as_ref().filter(|_| self.is_table()) {
             None if contact.preload.is_some() => 1.0,

@@ -338,7 +338,8 @@ pub fn pair(done: &Done, i: usize, approach: Option<f64>) -> PairResult {
     }
 }
 
-/// Return what the seal of pair `i` holds, from the pressures of its points; none without a seal. Tension holds nothing.
+/// Return what the seal of pair `i` holds, from the pressures of its points; none without a seal. Tension holds
+/// nothing.
 fn seal(done: &Done, i: usize, pressure: &[f64]) -> Option<SealReport> {
     let ContactFacts { seal, surface, .. } = &done.built.discrete.contacts[i];
     let seal = seal.as_ref()?;

@@ -52,8 +52,8 @@ pub fn without_history(scene: &Scene) -> Option<String> {
 /// Young's modulus of diamond in pascals. No solid is stiffer.
 const DIAMOND: f64 = 1.2e12;
 
-/// Return the warning of bodies that are stiffer than any solid in the unit of stresses that the scene names, if any: most
-/// often their modulus is in pascals, and the loads are not.
+/// Return the warning of bodies that are stiffer than any solid in the unit of stresses that the scene names, if any:
+/// most often their modulus is in pascals, and the loads are not.
 pub fn stiffer_than_diamond(scene: &Scene) -> Option<String> {
     let units = scene.units.as_ref()?;
     let (_, pascals) = [("Pa", 1.0), ("kPa", 1e3), ("MPa", 1e6), ("N/mm²", 1e6), ("N/mm^2", 1e6), ("GPa", 1e9)]
@@ -236,8 +236,8 @@ const BY_CHORDS: f64 = 0.1;
 ///
 /// The heights h of the surfaces above their facets close the gap, be it drawn as a clearance, as an overlap or as
 /// nothing. A point with the compression c and the pressure p then has the pressure where the law meets the line
-/// c + h + s p, with the compliance s of the bodies to a wave as long as the contact, or as a facet of elements of order
-/// two or more. A contact of Hertz with n facets in its radius changes by about 1/(4 n^2).
+/// c + h + s p, with the compliance s of the bodies to a wave as long as the contact, or as a facet of elements of
+/// order two or more. A contact of Hertz with n facets in its radius changes by about 1/(4 n^2).
 pub fn by_chords(done: &Done, i: usize) -> Option<String> {
     let (pair, layer, range) = (&done.model().pairs[i], &done.outcome.layer, done.model().range(i));
     let Chords { sagitta, height, wave } =

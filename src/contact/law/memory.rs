@@ -50,8 +50,8 @@ impl Unloading {
     }
 }
 
-/// Share of a pressure by which a law of unloading may be softer that is as stiff as the layer: a slope p/c that a table
-/// has with ten digits is off by 5e-11 of it.
+/// Share of a pressure by which a law of unloading may be softer that is as stiff as the layer: a slope p/c that a
+/// table has with ten digits is off by 5e-11 of it.
 const SAME: f64 = 1e-9;
 
 /// A law with the largest compressions that its points have seen.
