@@ -172,7 +172,7 @@ fn a_page_of_load_steps() {
     let warnings = html.find("<details><summary>3 warnings</summary>").expect("folded warnings");
     assert!(html.find("<canvas>").is_some_and(|picture| picture < warnings) && html.contains("<h2>Load steps</h2>"));
     // the force over approach and over time, and the least pressure, by which a gasket is judged
-    assert!([">approach</text>", ">time</text>"].iter().all(|axis| html.contains(axis)), "two plots");
+    assert!([">approach (", ">time</text>"].iter().all(|axis| html.contains(axis)), "two plots");
     let row = html.lines().find(|line| line.contains("top0 – seat0</td><td class=\"n\" data-of=\"step\">1</td>"));
     assert!(row.is_some_and(|row| row.contains("data-of=\"least pressure\">49.998</td>")), "{row:?}");
     let count = run.report["steps"].as_array().expect("steps").len();

@@ -58,6 +58,10 @@ fn forces_by_step() {
         for nut in [2, 3] {
             close("nut", force(&run, step, nut), bolt(step), 1e-7);
         }
+        // flanges lean on the outer edge of the gasket, where every way out meets its largest pressure
+        let gasket = |key: &str| run.number(&format!("steps/{step}/pairs/{GASKET}/{key}"));
+        assert!(gasket("mean_pressure") < 1.001 * gasket("sealing_pressure") && gasket("sealing_pressure") < gasket("peak_pressure"));
+        close("radius", gasket("sealing_at/0").hypot(gasket("sealing_at/1")), 43.0, 1e-3);
     }
     close("tightened", bolt(0), 25e3, 1e-7);
     assert!(bolt(1) > bolt(0) && bolt(1) < bolt(0) + thrust(4.0), "pressure pulls at the bolt, and at the gasket");
