@@ -190,7 +190,7 @@ impl Body {
             Some(matrix) if self.elastic.stiffness.rows() == 0 => {
                 matrix.multiply_stiffness(self.dofs.matrix_rows(), u, y)
             }
-            _ => self.elastic.stiffness.multiply(u, y),
+            _ => self.elastic.stiffness.multiply_symmetric(u, y),
         }
     }
 
