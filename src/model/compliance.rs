@@ -20,7 +20,7 @@ use super::motions::Motions;
 use super::{Body, BodySlot, DisplacementField, Model};
 use crate::error::{Error, Kind, Result};
 use crate::exchange::{Exchange, broadcast};
-use crate::linalg::{axpy, dot, long_dot};
+use crate::linalg::{axpy, dot, symmetric_product};
 use crate::petsc::{cholesky, cholesky_inverse, cholesky_solve};
 use crate::solver::BodyCounts;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
@@ -312,7 +312,9 @@ impl PinnedStiffness {
     fn solve(&self, r: &[f64]) -> Vec<f64> {
         let mut forces = r.to_vec();
         self.pins.iter().for_each(|&pin| forces[pin] = 0.0);
-        self.inverse.chunks_exact(self.count.max(1)).map(|row| long_dot(row, &forces)).collect()
+        let mut u = vec![0.0; self.count];
+        symmetric_product(&self.inverse, &forces, &mut u);
+        u
     }
 
     /// Add B K^-1 B' to F, n x n, for the contact rows of the body at these points.
