@@ -59,7 +59,8 @@ pub fn stiffer_than_diamond(scene: &Scene) -> Option<String> {
     let (_, pascals) = [("Pa", 1.0), ("kPa", 1e3), ("MPa", 1e6), ("N/mm²", 1e6), ("N/mm^2", 1e6), ("GPa", 1e9)]
         .into_iter()
         .find(|(name, _)| *name == units.stress)?;
-    let body = scene.bodies.iter().find(|body| body.young.as_ref().is_some_and(|young| young.number() * pascals > DIAMOND))?;
+    let body =
+        scene.bodies.iter().find(|body| body.young.as_ref().is_some_and(|young| young.number() * pascals > DIAMOND))?;
     let young = body.young.as_ref()?.number();
     Some(format!(
         "young = {} of `{}` is more than diamond has, {} {}: is it in the units of the scene?",

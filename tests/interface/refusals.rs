@@ -367,10 +367,22 @@ fn a_body_that_slides_freely_without_load() {
 /// A modulus in pascals beside pressures in megapascals is said, and one of a stiff solid is not.
 #[test]
 fn a_modulus_in_pascals() {
-    let cases = [("mm, MPa", "2.1e11", true), ("m, Pa", "2.1e11", false), ("mm, MPa", "1e6", false), ("mm, psi", "2.1e11", false)];
+    let cases = [
+        ("mm, MPa", "2.1e11", true),
+        ("m, Pa", "2.1e11", false),
+        ("mm, MPa", "1e6", false),
+        ("mm, psi", "2.1e11", false),
+    ];
     for (units, young, is_said) in cases {
-        let run = solve(case("patch"), &["--set", &format!("units='{units}'"), "--set", &format!("body.0.young={young}")]).converged();
-        assert_eq!(run.warnings().contains("more than diamond has, 1.2e+06 MPa"), is_said, "{units}, {young}: {}", run.warnings());
+        let run =
+            solve(case("patch"), &["--set", &format!("units='{units}'"), "--set", &format!("body.0.young={young}")])
+                .converged();
+        assert_eq!(
+            run.warnings().contains("more than diamond has, 1.2e+06 MPa"),
+            is_said,
+            "{units}, {young}: {}",
+            run.warnings()
+        );
     }
 }
 

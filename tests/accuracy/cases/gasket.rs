@@ -60,7 +60,10 @@ fn forces_by_step() {
         }
         // flanges lean on the outer edge of the gasket, where every way out meets its largest pressure
         let gasket = |key: &str| run.number(&format!("steps/{step}/pairs/{GASKET}/{key}"));
-        assert!(gasket("mean_pressure") < 1.001 * gasket("sealing_pressure") && gasket("sealing_pressure") < gasket("peak_pressure"));
+        assert!(
+            gasket("mean_pressure") < 1.001 * gasket("sealing_pressure")
+                && gasket("sealing_pressure") < gasket("peak_pressure")
+        );
         close("radius", gasket("sealing_at/0").hypot(gasket("sealing_at/1")), 43.0, 1e-3);
     }
     close("tightened", bolt(0), 25e3, 1e-7);
