@@ -144,7 +144,7 @@ impl Stagnation {
         let is_same = |[e, f1]: &[f64; 2]| (e - error).abs() <= SAME * error && (f1 - energy).abs() <= roundoff(energy);
         let repeats = self.seen.iter().any(is_same);
         self.seen.push([error, energy]);
-        let is_progress = is_better || is_lower || is_far && !repeats && (is_smoothed || fall < FALLS);
+        let is_progress = is_better || is_lower || is_far && (is_smoothed || fall < FALLS && !repeats);
         self.since = if is_progress { 0 } else { self.since + 1 };
         self.since >= PATIENCE
     }
