@@ -30,6 +30,7 @@
 //! | `newton::UNSEEN` | 0.01 | when smoothing ends, and what lies on the laws | two digits more than were asked for |
 //! | `stop::FALLS`, `NEAR_FALLS` | 0.9, 0.5 | what is progress far from the solution, and near it | random scenes, none lost |
 //! | `stop::SEEN` | 1e-12 | which falls of F1 are no roundoff | a sum of a million terms |
+//! | `stop::SAME` | 1e-6 | which errors are those of the same iterate | circles of steps in random scenes, equal to 1e-9 |
 //! | `stop::PATIENCE` | 3 | how many steps without progress end a run | random scenes, none lost |
 //! | `solve::TIMES` | 10 | how many tolerances of imbalance are no solution | the two norms differ by less |
 //! | `linalg::DIGIT` | 0.1 | when roundoff leaves no result | no digit is left |

@@ -181,7 +181,8 @@ const AHEAD: f64 = 100.0;
 ///
 /// ```text
 /// enter    at the second step with the laws themselves that is not taken whole:  mu = 100 D
-/// step     mu <- min(mu, D),  D from the smoothed laws: mu stays while the states are far, and falls as fast as Newton's method converges
+/// step     mu <- min(mu, D),  D from the smoothed laws: mu stays while the states are far, and falls as fast as
+///          Newton's method converges
 /// lost     mu <- D where D is more than 100 mu
 /// leave    when mu times the area is below what the tolerance of the run can detect
 /// ```
