@@ -205,13 +205,9 @@ pub fn countable(what: &str, entries: usize) -> Result<()> {
     Err(Error::new(Kind::Solver, message).help("take a coarser mesh, or order = 1"))
 }
 
-/// Compute y = A x for a symmetric matrix with all entries, row by row. Those up to the diagonal alone are read, since
-/// the product of a large matrix takes as long as its entries come from memory.
-pub fn symmetric_product(a: &[f64], x: &[f64], y: &mut [f64]) {
-    for (i, row) in a.chunks_exact(x.len().max(1)).enumerate() {
-        y[i] = long_dot(&row[..i], &x[..i]) + row[i] * x[i];
-        axpy(x[i], &row[..i], y);
-    }
+/// Compute y = A x for a square matrix with all entries, row by row.
+pub fn full_product(a: &[f64], x: &[f64], y: &mut [f64]) {
+    y.iter_mut().zip(a.chunks_exact(x.len().max(1))).for_each(|(y, row)| *y = long_dot(row, x));
 }
 
 /// Return x'y of long vectors. Its partial sums allow vector instructions.
@@ -381,16 +377,14 @@ mod tests {
         assert_eq!(a.position(0, 1), None);
     }
 
-    /// Rows longer than the partial sums of a product. What is above the diagonal is not read.
+    /// Rows longer than the partial sums of a product.
     #[test]
-    fn products_of_symmetric_matrices() {
-        let entry = |i: usize, j: usize| (i.max(j) * 3 + i.min(j)) as f64;
+    fn products_of_full_matrices() {
+        let entry = |i: usize, j: usize| (3 * i + j) as f64;
         let x: Vec<f64> = (0..19).map(|j| 1.0 - f64::from(j)).collect();
-        let full = |of: &dyn Fn(usize, usize) -> f64| (0..19 * 19).map(|at| of(at / 19, at % 19)).collect::<Vec<f64>>();
         let expected: Vec<f64> = (0..19).map(|i| (0..19).map(|j| entry(i, j) * x[j]).sum()).collect();
-        let lower = full(&|i, j| if j > i { f64::NAN } else { entry(i, j) });
         let mut y = vec![f64::NAN; 19];
-        symmetric_product(&lower, &x, &mut y);
+        full_product(&(0..19 * 19).map(|at| entry(at / 19, at % 19)).collect::<Vec<f64>>(), &x, &mut y);
         assert_eq!(y, expected);
     }
 

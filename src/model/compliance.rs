@@ -20,7 +20,7 @@ use super::motions::Motions;
 use super::{Body, BodySlot, DisplacementField, Model};
 use crate::error::{Error, Kind, Result};
 use crate::exchange::{Exchange, broadcast};
-use crate::linalg::{axpy, dot, symmetric_product};
+use crate::linalg::{axpy, dot, full_product};
 use crate::petsc::{cholesky, cholesky_inverse, cholesky_solve};
 use crate::solver::BodyCounts;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
@@ -313,7 +313,7 @@ impl PinnedStiffness {
         let mut forces = r.to_vec();
         self.pins.iter().for_each(|&pin| forces[pin] = 0.0);
         let mut u = vec![0.0; self.count];
-        symmetric_product(&self.inverse, &forces, &mut u);
+        full_product(&self.inverse, &forces, &mut u);
         u
     }
 

@@ -2,7 +2,7 @@
 
 use super::{Change, InnerSolver, SolveOutcome, Write};
 use crate::error::Result;
-use crate::linalg::symmetric_product;
+use crate::linalg::full_product;
 use crate::petsc::{Rows, cholesky, cholesky_solve};
 
 /// G as a dense matrix, which is factored when it is first needed after a change.
@@ -32,7 +32,7 @@ impl InnerSolver for Dense {
 
     fn multiply(&mut self, [to_stiffness, restore]: [&Write; 2], x: &[f64], y: &mut [f64]) -> Result<()> {
         to_stiffness(&mut self.values);
-        symmetric_product(&self.values, x, y);
+        full_product(&self.values, x, y);
         restore(&mut self.values);
         Ok(())
     }

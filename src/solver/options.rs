@@ -7,8 +7,8 @@
 //! 1. [`UserOptions`] gives each solver its options ([`Chosen`]). A solver for which an own option was typed has the
 //!    name of its body, or `newton` for the matrix of all bodies, as prefix in PETSc's table, and reads only options
 //!    with this prefix. All others have no prefix and read the plain options, as in a program with one solver.
-//! 2. The program adds its choice where the user wrote nothing. What solvers without a prefix may have differently, such
-//!    as types and tolerances, is set by calls of PETSc ([`Ksp::set_default`]).
+//! 2. The program adds its choice where the user wrote nothing. What solvers without a prefix may have differently,
+//!    such as types and tolerances, is set by calls of PETSc ([`Ksp::set_default`]).
 //! 3. When all solvers are set up, [`unread()`] goes through what nobody has read. A mistyped name ends the run before
 //!    it starts.
 
