@@ -294,10 +294,18 @@ pub fn output(mut command: Command, patience: Duration) -> (ExitStatus, String, 
     }
 }
 
+/// Send a signal to a process, by the shell, which has `kill` everywhere. Return whether there is the process.
+pub fn send(signal: &str, process: u32) -> bool {
+    Command::new("sh")
+        .args(["-c", &format!("kill -s {signal} {process}")])
+        .status()
+        .is_ok_and(|status| status.success())
+}
+
 /// Ends a process that hangs.
 fn end(child: &mut Child) {
     // mpiexec ends its ranks at this signal, and would leave them at a harder one
-    let _ = Command::new("kill").arg(child.id().to_string()).status();
+    send("TERM", child.id());
     let began = Instant::now();
     while began.elapsed() < Duration::from_secs(3) {
         if child.try_wait().is_ok_and(|status| status.is_some()) {

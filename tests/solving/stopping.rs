@@ -1,6 +1,6 @@
 //! What a run keeps when a signal, a kill or a full disk ends it.
 
-use crate::common::{Run, Scene, case, distance, environment, output, root, solve, solve_on, text_of};
+use crate::common::{Run, Scene, case, distance, environment, output, root, send, solve, solve_on, text_of};
 use serde_json::Value;
 use std::fs::{self, File};
 use std::path::Path;
@@ -110,8 +110,7 @@ impl Working {
 }
 
 fn signal(id: u32, name: &str) {
-    let sent = Command::new("kill").args(["-s", name, &id.to_string()]).status().expect("kill");
-    assert!(sent.success(), "no process {id} to send {name} to");
+    assert!(send(name, id), "no process {id} to send {name} to");
 }
 
 fn report(folder: &Path) -> Value {
@@ -232,7 +231,7 @@ fn a_killed_rank_ends_all() {
         std::thread::sleep(Duration::from_millis(wait));
         let Some(&rank) = run.children().last() else { continue };
         // it may have come to its end meanwhile
-        if !Command::new("kill").args(["-s", "KILL", &rank.to_string()]).status().expect("kill").success() {
+        if !send("KILL", rank) {
             continue;
         }
         let began = Instant::now();
