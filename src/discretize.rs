@@ -30,6 +30,7 @@ pub use assembly::{Assembled, Factory};
 pub use contact_surface::{Neighbours, corners};
 pub use facts::BodyInfo;
 pub use groups::find_group;
+use kept::EarlierPair;
 pub use kept::Kept;
 pub use marks::marks;
 pub use obstacle::Obstacle;
@@ -38,7 +39,7 @@ pub use post::ForceBalance;
 pub use prepare::Request;
 pub use verify::{Verified, verify};
 
-use crate::contact::{ContactPair, law};
+use crate::contact::law;
 use crate::error::Result;
 use crate::exchange::{Exchange, Plain, broadcast, scatter};
 use crate::model::{Body, BodySlot, Mechanism, Model};
@@ -80,14 +81,15 @@ struct Earlier {
     pairings: usize,
     /// Bodies with a mesh.
     bodies: Vec<BodySlot>,
-    pairs: Vec<(ContactPair, ContactFacts)>,
+    pairs: Vec<EarlierPair>,
 }
 
 impl Earlier {
     fn of(discrete: Discrete) -> Self {
         let Discrete { model: Model { mut bodies, pairs, .. }, contacts, assemblies, pairings, .. } = discrete;
         bodies.retain(|slot| !slot.is_rigid);
-        Self { assemblies, pairings, bodies, pairs: pairs.into_iter().zip(contacts).collect() }
+        let pairs = pairs.into_iter().zip(contacts).map(|(pair, facts)| EarlierPair { pair, facts });
+        Self { assemblies, pairings, bodies, pairs: pairs.collect() }
     }
 }
 

@@ -252,8 +252,8 @@ impl Turned {
     }
 }
 
-/// Gauss-Newton steps. Four reach the last digit on the cylinders and cones of the test, from the axis that their
-/// facets give; a surface that is no such shape costs all of each start in vain.
+/// Gauss-Newton steps: more than twice the four that reach the last digit on the cylinders and cones of the test, from
+/// the axis that their facets give. What needs more is no such shape, and costs all steps of each start in vain.
 const STEPS: usize = 10;
 
 /// Most sweeps of a decomposition of eight unknowns, which takes some dozens, and would not end where a point on the

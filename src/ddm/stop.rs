@@ -89,8 +89,9 @@ const NEAR_FALLS: f64 = 0.5;
 /// Share of F1 by which a fall is more than its roundoff: that of a sum of a million terms is 1e3 epsilon.
 const SEEN: f64 = 1e-12;
 
-/// Relative difference up to which errors are those of the same iterate. Under a layer 1e5 times as stiff as the bodies
-/// roundoff changed the errors of a circle of steps by 1e-9.
+/// Relative difference up to which errors are those of the same iterate. Below it is roundoff, which changed the errors
+/// of a circle of steps by 1e-9 under a layer 1e5 times as stiff as the bodies. Above it are steps that get
+/// somewhere: an error that falls by 1e-6 a step takes 2e6 steps to lose a digit.
 const SAME: f64 = 1e-6;
 
 /// Return whether F1 is less than it was `before` by more than roundoff.

@@ -5,7 +5,7 @@
 use super::assembly::Factory;
 use super::body_mesh::BodyMesh;
 use super::facts::BodyInfo;
-use super::kept::{Kept, MatrixInputs};
+use super::kept::{EarlierPair, Kept, MatrixInputs};
 use super::meshes::{KeptMeshes, Meshes};
 use super::pairs::{self, Contact, ContactFacts, Contacts};
 use super::partition::{BodyRanks, Partition};
@@ -107,7 +107,7 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     ranks: usize,
     factory: &mut F,
     kept: &mut Kept<D>,
-    pairs: Vec<(ContactPair, ContactFacts)>,
+    pairs: Vec<EarlierPair>,
 ) -> Result<(ReplicatedProblem<D, F::SolverPlan>, WholeProblem<'a, D>)> {
     let Request { scene, verified, cut, keep } = *request;
     let keep = keep.is_some();

@@ -193,6 +193,7 @@ mod tests {
     /// The result on a square of 6 by 6 points with diagonals is that of all ways, by Floyd and Warshall.
     #[test]
     fn the_weakest_point_is_that_of_all_ways() {
+        // few enough points for a cubic number of steps in each trial
         const SIDE: usize = 6;
         let count = SIDE * SIDE;
         let number = |i: usize, j: usize| (SIDE * j + i) as u32;
