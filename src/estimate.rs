@@ -6,6 +6,7 @@
 //! elements cannot represent, which acts like a load on the discrete problem. The response to that load is the error of
 //! nodal displacements and nodal pressures.
 
+mod end;
 mod force;
 mod held;
 pub mod interpolate;
@@ -13,6 +14,7 @@ mod pressure;
 pub mod sizes;
 pub mod transfer;
 
+use crate::contact::FinePoints;
 use crate::ddm::respond;
 use crate::discretize::meshes::{KeptMeshes, Meshes, RecoveredBody, in_dimension};
 use crate::error::{Error, Kind, Result};
@@ -22,6 +24,7 @@ use crate::model::field::residual;
 use crate::model::layer::meeting_slopes;
 use crate::model::{DisplacementField, Layer, LinearStep, Model};
 use crate::scene::Quantity;
+use end::EndLoads;
 use held::HoldingSprings;
 pub use pressure::{Cause, Guess, softness};
 use pressure::{LayerError, PressureErrors, SAFETY};
@@ -125,7 +128,7 @@ fn estimate_in<const D: usize>(
     local.cells.iter_mut().zip(&local.strips).for_each(|(cells, strips)| axpy(1.0, strips, cells));
     let held = HoldingSprings::of(model, layer);
     held.balance(meshes, model, &mut local.loads);
-    let LocalErrors { cells, rates, mut loads, layers, mean_error, .. } = local;
+    let LocalErrors { cells, rates, mut loads, layers, mean_error, misfit, .. } = local;
     to_dofs(meshes, model, &mut loads);
 
     let NodalErrors { field, closing, energy: nodal } = nodal_errors(model, step, layer, &loads, &mean_error)?;
@@ -136,7 +139,7 @@ fn estimate_in<const D: usize>(
     // the error of nodal values is a part of the whole error
     let whole = bodies.iter().chain(&layers).sum::<f64>().max(nodal);
     let energy = relative_norm(whole, reference, held.energy);
-    let pressures = PressureErrors::new(meshes, model, layer, &closing);
+    let pressures = PressureErrors::new(meshes, model, layer, &closing, &misfit);
     let solution = force::SolvedProblem { iterate, layer, displacements: &displacements, recovered: &recovered };
     let force = force::errors(meshes, model, step, &solution, &pressures.error)?;
     let mut trace = iterate.trace.clone();
@@ -252,6 +255,8 @@ struct LocalErrors {
     /// Difference of the compression at each contact point, n, from its mean around the point, which the discrete
     /// problem takes in its place.
     mean_error: Vec<f64>,
+    /// Error of the pressure of each contact point, n, that is no response to loads: [`EndLoads::misfit`].
+    misfit: Vec<f64>,
 }
 
 impl LocalErrors {
@@ -260,7 +265,8 @@ impl LocalErrors {
         let count = recovered.len();
         let none = || vec![Vec::new(); count];
         let (cells, rates, strips, loads) = (none(), none(), none(), none());
-        let mut local = Self { cells, rates, strips, loads, layers: Vec::new(), mean_error: Vec::new() };
+        let mut local =
+            Self { cells, rates, strips, loads, layers: Vec::new(), mean_error: Vec::new(), misfit: Vec::new() };
         for (body, recovered) in recovered.iter().enumerate() {
             if let Some(recovered) = recovered {
                 let Errors { cells, rates, strips, load } = recovered.errors(work_on_missed[body]);
@@ -301,18 +307,42 @@ impl LocalErrors {
         let springs: Vec<f64> =
             range.clone().zip(&mean_error).map(|(q, c)| model.area[q] * layer.tangent[q] * c).collect();
         let of_layer = LayerError::new(model, points, layer, index, &compression, &mean_error);
-        let force: Vec<f64> = of_layer.pressure.iter().zip(&points.each).map(|(p, point)| -point.weight * p).collect();
+        let ends = loads_at_ends(model, points, layer, index);
+        let mut discrete = vec![0.0; points.each.len()];
+        points.pressing.multiply(&layer.pressure[range.clone()], &mut discrete);
+        let pressure = of_layer.pressure.iter().zip(&discrete).zip(&points.each);
+        let force: Vec<f64> = pressure
+            .map(|((p, discrete), point)| -point.weight * if ends.facets.contains(&point.facet) { discrete } else { p })
+            .collect();
+        let at_ends: Vec<f64> = range.clone().zip(&ends.force).map(|(q, force)| model.area[q] * force).collect();
         for side in 0..2 {
             let (body, nodal) = (pair.bodies[side], &pair.nodal[side]);
             if let Some(recovered) = &recovered[body] {
                 recovered.add_forces(index, side, &force, &mut self.loads[body]);
                 nodal.add_transpose(1.0, &layer.force[range.clone()], &mut self.loads[body]);
                 nodal.add_transpose(-1.0, &springs, &mut self.loads[body]);
+                nodal.add_transpose(1.0, &at_ends, &mut self.loads[body]);
             }
         }
         self.layers.push(of_layer.energy);
         self.mean_error.extend(mean_error);
+        self.misfit.extend(ends.misfit);
     }
+}
+
+/// Return the loads beside the ends of contact of a pair; a bond has none.
+fn loads_at_ends(model: &Model, points: &FinePoints, layer: &Layer, index: usize) -> EndLoads {
+    let (pair, range) = (&model.pairs[index], model.range(index));
+    if pair.law.is_bonded() {
+        return EndLoads::none(pair.len());
+    }
+    let values = end::LayerValues {
+        position: &pair.position,
+        pressure: &layer.pressure[range.clone()],
+        tangent: &layer.tangent[range],
+        softness: softness(model, index),
+    };
+    EndLoads::new(points, &values)
 }
 
 /// Return the work of the pressures of all contacts on the interpolation error of each body that this rank owns.

@@ -6,7 +6,7 @@ DefineConstant[ L = {2, Name "L"} ];    // wavelength
 DefineConstant[ D = {1e-4, Name "D"} ]; // amplitude
 
 s = 0.27*L;  // under the load of the scene
-knots = 64;  // of the spline that stands for the wave: 1e-8 D from it
+knots = 128; // of the spline that stands for the wave, denser at its ends, where a spline has no curvature
 
 Point(1) = {0, 0, 0};
 Point(2) = {L/2, 0, 0};
@@ -20,7 +20,7 @@ Curve Loop(1) = {1, 2, 3, 4};
 Plane Surface(1) = {1};
 
 For i In {0 : knots}
-  Point(100 + i) = {L/2*i/knots, D*(1 - Cos(Pi*i/knots)), 0};
+  Point(100 + i) = {L/4*(1 - Cos(Pi*i/knots)), D*(1 - Cos(Pi/2*(1 - Cos(Pi*i/knots)))), 0};
 EndFor
 Point(11) = {L/2, L, 0};
 Point(12) = {0, L, 0};

@@ -66,6 +66,17 @@ impl PointTree {
     }
 }
 
+/// Return the first and the last point of an edge, `edge` being the indices of all its points: those that are farthest
+/// apart.
+pub fn ends(points: &[[f64; 3]], edge: &[usize]) -> [usize; 2] {
+    let farthest = |from: usize| {
+        let apart = |point: usize| length(minus(points[point], points[from]));
+        edge.iter().copied().max_by(|&p, &q| apart(p).total_cmp(&apart(q))).unwrap_or(from)
+    };
+    let first = farthest(edge[0]);
+    [first, farthest(first)]
+}
+
 /// Return the weights of the values of an edge's points in the value at a point of the polynomial through them, and of
 /// that through all but the middle one. The edge is the nearest one of `edges`, each the indices of its `points`. The
 /// polynomials are those of the way along its chord.
@@ -73,21 +84,15 @@ impl PointTree {
 /// A solution may have a kink where edges meet, so that no polynomial goes through the points of two edges.
 pub fn on_edge(points: &[[f64; 3]], edges: &[Vec<usize>], at: &[f64; 3]) -> [Weights; 2] {
     let along = |edge: &[usize]| {
-        let farthest = |from: usize| {
-            edge.iter().copied().max_by(|&p, &q| {
-                let apart = |point: usize| length(minus(points[point], points[from]));
-                apart(p).total_cmp(&apart(q))
-            })
-        };
-        let first = farthest(edge[0])?;
-        let chord = minus(points[farthest(first)?], points[first]);
+        let [first, last] = ends(points, edge);
+        let chord = minus(points[last], points[first]);
         let place = move |x: [f64; 3]| dot(&minus(x, points[first]), &chord) / dot(&chord, &chord);
         let here = place(*at);
         let foot: [f64; 3] = std::array::from_fn(|c| points[first][c] + here.clamp(0.0, 1.0) * chord[c]);
         let places: Vec<f64> = edge.iter().map(|&point| place(points[point])).collect();
-        Some((length(minus(*at, foot)), here, places))
+        (length(minus(*at, foot)), here, places)
     };
-    let known = edges.iter().filter(|edge| edge.len() > 1).filter_map(|edge| Some((edge, along(edge)?)));
+    let known = edges.iter().filter(|edge| edge.len() > 1).map(|edge| (edge, along(edge)));
     let Some((edge, (_, here, mut places))) = known.min_by(|p, q| p.1.0.total_cmp(&q.1.0)) else {
         return Default::default();
     };

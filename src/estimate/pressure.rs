@@ -65,10 +65,17 @@ impl PressureErrors {
     /// The response that gave these is that of springs at the closed points. So a point that opens or closes takes the
     /// resolvent of its law for the state in the response, as in a step of Newton's method. This allows for the bodies,
     /// which give way to the pressure of a point however stiff its layer is.
-    pub fn new<const D: usize>(meshes: &KeptMeshes<D>, model: &Model, layer: &Layer, closing: &[f64]) -> Self {
+    pub fn new<const D: usize>(
+        meshes: &KeptMeshes<D>,
+        model: &Model,
+        layer: &Layer,
+        closing: &[f64],
+        misfit: &[f64],
+    ) -> Self {
         let compression: Vec<f64> = layer.compression.iter().zip(closing).map(|(c, more)| c + more).collect();
         let resolved = Layer::resolve(model, &compression, &layer.linear(&compression), &meeting_slopes(model), &[]);
-        let error = resolved.pressure.iter().zip(&layer.pressure).map(|(exact, discrete)| exact - discrete).collect();
+        let of_points = resolved.pressure.iter().zip(&layer.pressure).zip(misfit);
+        let error = of_points.map(|((exact, discrete), misfit)| exact - discrete + misfit).collect();
         let mut errors = Self { error, relative: Vec::new(), ends: Vec::new(), worst: Vec::new(), guesses: Vec::new() };
         for pair in 0..model.pairs.len() {
             errors.add_pair(meshes.points(pair), model, layer, pair);

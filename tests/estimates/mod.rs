@@ -3,6 +3,7 @@
 mod bound;
 mod carrier;
 mod effectivity;
+mod ends;
 mod estimate;
 mod forces;
 mod orders;
