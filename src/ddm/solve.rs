@@ -263,6 +263,9 @@ fn find_start(model: &Model) -> std::result::Result<RigidStart, Status> {
 /// Return a motion of a body together with rigid parts that changes no gap, if there is one: the parts follow the body
 /// wherever it goes.
 fn follows(model: &Model) -> Option<NamedMotion> {
+    if !model.bodies.iter().any(|slot| slot.is_rigid) {
+        return None;
+    }
     let motions = Motions::of(model);
     let has_rigid = |all: &Vec<NamedMotion>| all.iter().any(|moved| model.bodies[moved.body].is_rigid);
     let all = motions.springs(&model.area).factor().kernel();

@@ -320,9 +320,19 @@ impl Factor {
 }
 
 impl Blocks {
-    /// Factor the matrix and find its kernel: see [`Factor`].
-    pub fn factor(&self) -> Factor {
-        Factor::new(self, unit_diagonal(self), TOLERANCE)
+    /// Factor the matrix and find its kernel: see [`Factor`]. The factor is kept for the next call with the same matrix:
+    /// a step of Newton's method asks for the motions that its springs leave free, its coarse space for the factor of
+    /// the same springs, and the look at its equilibrium for the motions again.
+    pub fn factor(&self) -> Rc<Factor> {
+        let new = || Rc::new(Factor::new(self, unit_diagonal(self), TOLERANCE));
+        // a single body does not replace the matrix that is kept
+        if self.rows() < 2 {
+            return new();
+        }
+        LAST_FACTOR.with_borrow_mut(|last| match last {
+            Some((matrix, factor)) if matrix == self => Rc::clone(factor),
+            _ => Rc::clone(&last.insert((self.clone(), new())).1),
+        })
     }
 
     /// Factor the matrix without scaling. The kernel has the combinations e of all unknowns with e'Ae <= `tolerance *
@@ -401,7 +411,7 @@ fn steps(matrix: &Blocks, columns: &[BlockColumn]) -> Vec<usize> {
 }
 
 /// A symmetric matrix of dense blocks; only non-zero blocks are stored.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Blocks {
     /// First unknown of each row of blocks, and the number of all unknowns.
     first: Vec<usize>,
@@ -486,6 +496,8 @@ pub type EliminationOrder = Rc<Vec<(usize, Vec<usize>)>>;
 thread_local! {
     /// The last graph with its order.
     static LAST: RefCell<(Vec<Vec<usize>>, EliminationOrder)> = RefCell::default();
+    /// The last matrix with its factor.
+    static LAST_FACTOR: RefCell<Option<(Blocks, Rc<Factor>)>> = const { RefCell::new(None) };
 }
 
 /// Return [`order`] of a graph; it is kept for the next call with the same graph. A run factors the springs between its
@@ -573,7 +585,7 @@ mod tests {
     }
 
     /// Checks the rank, every kernel vector, that they are a reduced basis, and solutions.
-    fn check(matrix: &Blocks, nullity: usize, tolerance: f64) -> Factor {
+    fn check(matrix: &Blocks, nullity: usize, tolerance: f64) -> Rc<Factor> {
         let factor = matrix.factor();
         let kernel = factor.kernel();
         assert_eq!((kernel.len(), factor.rank()), (nullity, matrix.unknowns() - nullity));
@@ -593,6 +605,21 @@ mod tests {
         let error = (matrix.multiply(&factor.solve(&b)) - &b).amax();
         assert!(error <= tolerance * b.amax().max(1e-300), "{error} of {}", b.amax());
         factor
+    }
+
+    #[test]
+    fn a_matrix_is_factored_once() {
+        let block = |value: f64| DMatrix::from_element(1, 1, value);
+        let mut matrix = Blocks::new(&[1, 1]);
+        [(0, 0, 2.0), (0, 1, -1.0), (1, 1, 2.0)].into_iter().for_each(|(i, j, value)| matrix.add(i, j, &block(value)));
+        let first = matrix.factor();
+        assert!(Rc::ptr_eq(&first, &matrix.clone().factor()));
+        matrix.add(1, 1, &block(1.0));
+        let other = matrix.factor();
+        assert!(
+            !Rc::ptr_eq(&first, &other)
+                && (other.solve(&DVector::from_vec(vec![1.0, 2.0])) - DVector::from_vec(vec![1.0, 1.0])).amax() < 1e-15
+        );
     }
 
     #[test]

@@ -99,7 +99,7 @@ struct WithSprings {
     /// The diagonal of D, one entry a contact point.
     springs: Vec<f64>,
     /// Z'HZ.
-    factor: Factor,
+    factor: Rc<Factor>,
 }
 
 impl Subspace for WithSprings {

@@ -2,7 +2,7 @@
 //! only files that this program has made, which it knows by what stands in them.
 
 use crate::error::{Error, Kind, Result};
-use serde_json::Value;
+use serde::Deserialize;
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::fs::{self, File, Permissions, TryLockError};
@@ -18,6 +18,12 @@ pub struct Folder {
     files: RefCell<BTreeSet<String>>,
     /// The open folder, locked for the process that writes the tables of a run.
     _lock: Option<Lock>,
+}
+
+/// What is read of the report of an earlier run.
+#[derive(Default, Deserialize)]
+struct EarlierReport {
+    files: Vec<String>,
 }
 
 /// The name of the report in the folder.
@@ -138,9 +144,8 @@ impl Folder {
     fn listed(&self) -> Vec<String> {
         let path = self.path.join(REPORT);
         let text = fs::read(&path).ok().filter(|_| is_made(&path)).unwrap_or_default();
-        let report: Value = serde_json::from_slice(&text).unwrap_or_default();
-        let files = report["files"].as_array().into_iter().flatten().filter_map(Value::as_str);
-        let results = files.filter(|name| may_be_result(name) && *name != REPORT).map(str::to_owned);
+        let report: EarlierReport = serde_json::from_slice(&text).unwrap_or_default();
+        let results = report.files.into_iter().filter(|name| may_be_result(name) && name != REPORT);
         let own = (!text.is_empty()).then(|| REPORT.to_owned());
         results.chain(own).collect()
     }

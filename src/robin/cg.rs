@@ -14,6 +14,7 @@ use crate::model::field::{DisplacementField, add_forces, local_dot};
 use crate::model::linear::{Failure, LinearSolution, LinearStep, Solved, StoppingTest, System, Trial};
 use crate::model::motions::Motions;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use std::rc::Rc;
 
 /// Most iterations of a linear step: long before, rounding spoils the conjugacy of the directions.
 pub(super) const MOST_SWEEPS: usize = 400;
@@ -135,7 +136,7 @@ struct Gradients<'a> {
     /// omega kappa, n.
     springs: &'a [f64],
     /// Z'HZ.
-    coarse: Factor,
+    coarse: Rc<Factor>,
     /// The residual, on the dofs of each body that lives on this rank.
     r: Vec<Vec<f64>>,
     /// Its work on the free motions of all bodies.
