@@ -14,7 +14,6 @@ mod marks;
 mod mechanism;
 pub mod meshes;
 mod obstacle;
-mod owned_dofs;
 mod pairs;
 mod partition;
 mod patterns;
@@ -30,7 +29,6 @@ pub use assembly::{Assembled, Factory};
 pub use contact_surface::{Neighbours, corners};
 pub use facts::BodyInfo;
 pub use groups::find_group;
-use kept::EarlierPair;
 pub use kept::Kept;
 pub use marks::marks;
 pub use obstacle::Obstacle;
@@ -39,7 +37,7 @@ pub use post::ForceBalance;
 pub use prepare::Request;
 pub use verify::{Verified, verify};
 
-use crate::contact::law;
+use crate::contact::{ContactPair, law};
 use crate::error::Result;
 use crate::exchange::{Exchange, Plain, broadcast, scatter};
 use crate::model::{Body, BodySlot, Mechanism, Model};
@@ -81,15 +79,14 @@ struct Earlier {
     pairings: usize,
     /// Bodies with a mesh.
     bodies: Vec<BodySlot>,
-    pairs: Vec<EarlierPair>,
+    pairs: Vec<(ContactPair, ContactFacts)>,
 }
 
 impl Earlier {
     fn of(discrete: Discrete) -> Self {
         let Discrete { model: Model { mut bodies, pairs, .. }, contacts, assemblies, pairings, .. } = discrete;
         bodies.retain(|slot| !slot.is_rigid);
-        let pairs = pairs.into_iter().zip(contacts).map(|(pair, facts)| EarlierPair { pair, facts });
-        Self { assemblies, pairings, bodies, pairs: pairs.collect() }
+        Self { assemblies, pairings, bodies, pairs: pairs.into_iter().zip(contacts).collect() }
     }
 }
 
@@ -180,8 +177,8 @@ where
     };
     let part = |rank| prepared.as_ref().map_or_else(Vec::new, |whole| whole.on(rank));
     let mut locals: Vec<Option<BodyMesh<D>>> = scatter(&**exchange, part)?;
-    for owned in locals.iter_mut().flatten().filter_map(|local| local.owned.as_mut()) {
-        owned.distribution.exchange = exchange.clone();
+    for distribution in locals.iter_mut().flatten().filter_map(|local| local.distribution.as_mut()) {
+        distribution.exchange = exchange.clone();
     }
     Ok(locals)
 }

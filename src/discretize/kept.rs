@@ -30,13 +30,6 @@ impl<const D: usize> Default for Kept<D> {
     }
 }
 
-/// A pair of the problem before.
-pub struct EarlierPair {
-    /// Arrays on which the method works.
-    pub pair: ContactPair,
-    pub facts: ContactFacts,
-}
-
 impl<const D: usize> Kept<D> {
     /// Return the spaces of the bodies.
     pub fn spaces(&self) -> Vec<Rc<Space<D>>> {
@@ -44,10 +37,14 @@ impl<const D: usize> Kept<D> {
     }
 
     /// Return the pairs of the problem, with these arrays and facts, for one with other `bodies`.
-    pub fn serving_pairs(&mut self, bodies: &[MatrixInputs<D>], pairs: Vec<EarlierPair>) -> KeptPairs<'_, D> {
+    pub fn serving_pairs(
+        &mut self,
+        bodies: &[MatrixInputs<D>],
+        pairs: Vec<(ContactPair, ContactFacts)>,
+    ) -> KeptPairs<'_, D> {
         let (pairs, both) = (pairs.into_iter().zip(self.pairs.drain(..)), || bodies.iter().zip(&self.bodies));
         KeptPairs {
-            pairs: pairs.map(|(EarlierPair { pair, facts }, inputs)| Contact { pair, facts, inputs }).collect(),
+            pairs: pairs.map(|((pair, facts), inputs)| Contact { pair, facts, inputs }).collect(),
             rules: &self.rules,
             is_material_same: both().map(|(body, before)| body.has_material_of(before)).collect(),
             are_bodies_same: both().all(|(body, before)| body.has_pairs_of(before)),

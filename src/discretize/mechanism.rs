@@ -1,8 +1,9 @@
 //! Rigid motions of bodies, alone or together, that neither supports nor springs nor contact resist.
 //!
 //! A body may slide on a plane, halves of a ring of blocks may slide on each other, and a group of bodies without
-//! supports may move as one. These motions close no point of contact ([`Squares`]), among the motions that supports and
-//! springs leave to each body. Motions of a whole group come first, so that they are found and named as such.
+//! supports may move as one. These motions close no point of contact ([`ClosingSquares`]), among the motions that
+//! supports and springs leave to each body. Motions of a whole group come first, so that they are found and named as
+//! such.
 //!
 //! Facets resist motions that smooth surfaces do not, such as the turn of a pin in a hub, because their normals lean
 //! (docs/theory.md, "Motions that nothing holds"). Such motions count as free.
@@ -57,14 +58,6 @@ struct GroupMotion<const D: usize> {
     amounts: DVector<f64>,
 }
 
-/// The motion of several bodies that is nearest to one of them as one.
-struct NearMotion {
-    /// The amounts of the motions of all bodies.
-    amounts: DVector<f64>,
-    /// What the displacements of the corners of the boxes around the bodies lack.
-    off: Vec<f64>,
-}
-
 struct MechanismSearch<'p, 's, const D: usize> {
     bodies: &'p mut [SceneBody<'s, D>],
     pairs: &'p mut [ContactPair],
@@ -116,16 +109,18 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
 
     /// Return the motions of a group as one body that the supports of its bodies leave.
     fn as_one(&self, group: &[usize]) -> Vec<DVector<f64>> {
-        let near: Vec<NearMotion> = self.common(group).iter().map(|motion| self.near(group, motion)).collect();
-        let displacements = near.first().map_or(1, |motion| motion.off.len() / group.len());
-        let held = DMatrix::from_fn(near.len(), near.len(), |i, j| dot(&near[i].off, &near[j].off));
+        let near = self.common(group).into_iter().map(|motion| self.near(group, &motion));
+        let (amounts, off): (Vec<DVector<f64>>, Vec<Vec<f64>>) = near.unzip();
+        let displacements = off.first().map_or(1, |off| off.len() / group.len());
+        let held = DMatrix::from_fn(off.len(), off.len(), |i, j| dot(&off[i], &off[j]));
         let free = Blocks::free(&(held / displacements as f64), 1.0, TOLERANCE);
-        let sum = |weights: DVector<f64>| weights.iter().zip(&near).map(|(w, motion)| *w * &motion.amounts).sum();
+        let sum = |weights: DVector<f64>| weights.iter().zip(&amounts).map(|(w, amounts)| *w * amounts).sum();
         free.into_iter().map(sum).collect()
     }
 
-    /// Return what comes nearest to a motion of several bodies as one among the motions that supports leave.
-    fn near(&self, bodies: &[usize], motion: &RigidMotion<D>) -> NearMotion {
+    /// Return the amounts of the motions of all bodies that come nearest to a motion of several bodies as one, and what
+    /// the displacements of the corners of the boxes around these bodies then lack.
+    fn near(&self, bodies: &[usize], motion: &RigidMotion<D>) -> (DVector<f64>, Vec<f64>) {
         let (mut amounts, mut off) = (DVector::zeros(self.count()), Vec::new());
         for &body in bodies {
             let left: Vec<Vec<f64>> = self.unconstrained(body).iter().map(|own| self.at_corners(body, own)).collect();
@@ -135,7 +130,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
             amounts.as_mut_slice()[self.first(body)..][..own.len()].copy_from_slice(&own);
             off.extend(rest);
         }
-        NearMotion { amounts, off }
+        (amounts, off)
     }
 
     /// Return the number of all motions.
@@ -152,8 +147,8 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
     ///
     /// Motions are of size one. So a motion that closes less than the error of the normals is free, and so is one that
     /// closes less than the root of [`TOLERANCE`], the error of coordinates on curves.
-    fn kernel(&self, squares: &Squares) -> Vec<DVector<f64>> {
-        let Squares { closing, leaning, .. } = squares;
+    fn kernel(&self, squares: &ClosingSquares) -> Vec<DVector<f64>> {
+        let ClosingSquares { closing, leaning, .. } = squares;
         let mut held = closing.clone();
         leaning.stored().for_each(|(i, j, block)| held.add(i, j, &(-DOUBT * block)));
         let held = held.factor_unscaled(self.tolerance());
@@ -185,11 +180,11 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
         TOLERANCE.max(self.tilt * self.tilt)
     }
 
-    /// Return the [`Squares`] of all pairs.
+    /// Return the [`ClosingSquares`] of all pairs.
     ///
     /// The displacement between the two sides is that of both motions at the position of the point. So bodies that move
     /// as one close nothing, whatever the rows of a mesh say where curved surfaces are apart.
-    fn squares(&self) -> Squares {
+    fn squares(&self) -> ClosingSquares {
         let sizes: Vec<usize> = (0..self.bodies.len()).map(|body| self.unconstrained(body).len()).collect();
         let [mut closing, mut leaning, mut error] = [0; 3].map(|_| Blocks::new(&sizes));
         for pair in self.pairs.iter().filter(|pair| pair.bodies[0] != pair.bodies[1]) {
@@ -209,7 +204,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
                 }
             }
         }
-        Squares { closing, leaning, error }
+        ClosingSquares { closing, leaning, error }
     }
 
     /// Turn the normals of all pairs across the motions that are fixed, so that contact does not resist them to the
@@ -375,7 +370,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
         for (span, shift) in spans.iter_mut().zip(shifts) {
             let (_, amounts) = span;
             for c in (0..D).filter(|&c| shift[c] != 0.0) {
-                *amounts += shift[c] * self.near(bodies, &whole[c]).amounts;
+                *amounts += shift[c] * self.near(bodies, &whole[c]).0;
             }
         }
         spans.into_iter().map(|(motion, amounts)| (motion.in_words(), self.moving(amounts))).collect()
@@ -452,7 +447,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
 
 /// Quadratic forms of the motions of all bodies. Let u be the displacement between the two sides at a point with the
 /// normal n.
-struct Squares {
+struct ClosingSquares {
     /// Mean squares of the closings n.u, summed over pairs.
     closing: Blocks,
     /// Mean squares of (n_f - n).u with the normals n_f of the facets around.
@@ -462,7 +457,7 @@ struct Squares {
     error: Blocks,
 }
 
-impl Squares {
+impl ClosingSquares {
     /// Return whether a motion differs from another by no more than the error of that one.
     fn is_near(&self, motion: &DVector<f64>, other: &DVector<f64>) -> bool {
         self.closing.energy(motion) <= self.closing.energy(other) + self.error.energy(other)

@@ -9,7 +9,7 @@ use super::scene_body::SceneBody;
 use super::seal::{self, Seal, Sealing};
 use crate::contact::law::{self, OwnLaws};
 use crate::contact::pieces::{Cut, Intersection, Reach};
-use crate::contact::{self, Chords, ContactPair, Fault, Fine, Mirrors, Side, Tangents, Turns};
+use crate::contact::{self, Chords, ContactPair, Fine, Mirrors, PairFault, Side, Tangents, Turns};
 use crate::error::{Error, Located, Result};
 use crate::fem::{Facets, jumping, minus, unit};
 use crate::linalg::{bounds, dot};
@@ -44,14 +44,6 @@ pub struct PairInputs<const D: usize> {
     pub fine: Option<Rc<Fine<D>>>,
 }
 
-/// The contacts of a problem.
-pub struct Contacts<const D: usize> {
-    /// All pairs, and what is known of each.
-    pub all: Vec<Contact<D>>,
-    /// Number of pairs whose surfaces were searched for common pieces.
-    pub searched: usize,
-}
-
 /// The pairs of a problem on the same mesh.
 pub struct KeptPairs<'a, const D: usize> {
     pub pairs: Vec<Contact<D>>,
@@ -79,21 +71,21 @@ pub struct ContactFacts {
     /// Mesh of side a, for output.
     pub surface: ContactSurface,
     /// Facets of both sides that face each other.
-    pub facing: Vec<Facing>,
+    pub facing: Vec<FacetPair>,
     /// The ways of a fluid along the surface, if the scene names two ends of it.
     pub seal: Option<Seal>,
 }
 
 /// A facet of side a and one of side b that face each other.
 #[derive(Serialize, Deserialize)]
-pub struct Facing {
+pub struct FacetPair {
     /// Corners of both facets ([`corners`]). Before an obstacle both are the facet itself.
     pub facets: [[u32; 3]; 2],
     /// Contact points on the facet of side a.
     pub points: Vec<usize>,
 }
 
-impl Facing {
+impl FacetPair {
     /// Return the facets of both sides with a common piece, sorted.
     fn all<const D: usize>(
         parts: &[SceneBody<D>],
@@ -138,7 +130,7 @@ fn between(spec: &ContactSpec, names: [String; 2]) -> ContactSpec {
 
 /// Return all pairs of the scene: first the named ones in the order of the file, then those that are found. `fine`
 /// requests integration points. Pairs of an earlier problem that serve get the gap, the law and the supports of this
-/// one.
+/// one. The second result is the number of pairs whose surfaces were searched for common pieces.
 ///
 /// # Errors
 /// A surface is missing, bounds no body or several, or does not face its partner. A law or a gap has no value
@@ -150,7 +142,7 @@ pub fn all<const D: usize>(
     parts: &[SceneBody<D>],
     fine: bool,
     mut kept: KeptPairs<D>,
-) -> Result<Contacts<D>> {
+) -> Result<(Vec<Contact<D>>, usize)> {
     let points = parts.iter().zip(0..).filter(|_| scene.pairs().next().is_some());
     let owners =
         Owners::new(points.flat_map(|(part, body)| part.mesh.space.mesh_points().map(move |p| (p, body))).collect());
@@ -182,7 +174,7 @@ pub fn all<const D: usize>(
         refuse_second_layers(scene, &all[..count])?;
     }
     auto::all_find_some(&rules, all.iter().map(|contact| contact.facts.table))?;
-    Ok(Contacts { all, searched })
+    Ok((all, searched))
 }
 
 impl<const D: usize> KeptPairs<'_, D> {
@@ -394,7 +386,7 @@ impl<'a, const D: usize> SurfacePair<'a, D> {
         let gap = |x| spec.gap.eval(x);
         let law = |position: &[[f64; 3]]| law::of_pair(&spec, &scene.laws, position);
         let mut pair = match contact::assemble(&a, &b, bodies, &common, &gap, &law) {
-            Err(Fault::NoPartner) if is_found => return Ok(None),
+            Err(PairFault::NoPartner) if is_found => return Ok(None),
             assembled => assembled.map_err(|fault| refuse(&spec, fault, || why(&a, &b, cut)))?,
         };
         pair.surfaces = surfaces;
@@ -422,7 +414,7 @@ impl<'a, const D: usize> SurfacePair<'a, D> {
         }
         let chords = if is_touching { None } else { Chords::of(&a, &b, &common, &pair) };
         let ends = spec.distance.map_or(Vec::new(), |_| contact::ends(&a, &common, &pair, &far));
-        let facing = Facing::all(parts, [&a, &b], &common, &pair);
+        let facing = FacetPair::all(parts, [&a, &b], &common, &pair);
         let fine = fine.map(Rc::new);
         Ok(Some(Contact {
             pair,
@@ -462,17 +454,17 @@ pub fn of_pair(spec: &ContactSpec) -> String {
 }
 
 /// Return the error of a pair. `why` says where its surfaces are nearest to each other.
-fn refuse(spec: &ContactSpec, fault: Fault, why: impl Fn() -> String) -> Error {
+fn refuse(spec: &ContactSpec, fault: PairFault, why: impl Fn() -> String) -> Error {
     match fault {
-        Fault::Law(error) => error.because(of_pair(spec)),
-        Fault::NoPartner => {
+        PairFault::Law(error) => error.because(of_pair(spec)),
+        PairFault::NoPartner => {
             let [a, b] = spec.between.each_ref().map(|name| &name.value);
             let message = format!("`{a}` and `{b}` do not face each other anywhere");
             Error::scene(&spec.between[0].place, message)
                 .because(why())
                 .help("name the sides of the bodies that look at each other (`winkler mesh` has their places), move a body, or give a larger `distance` or `angle`")
         }
-        Fault::Gap(x) => {
+        PairFault::Gap(x) => {
             spec.gap.eval_finite("the gap", x).err().map(|error| error.because(of_pair(spec))).unwrap_or_else(|| {
                 let message = format!("the gap is beyond the range of numbers at {}", point(x));
                 Error::scene(&spec.between[0].place, message)

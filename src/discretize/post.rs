@@ -223,13 +223,11 @@ impl<const D: usize> Post for FemBody<D> {
         let exact = self.exact.as_ref()?;
         let at = |x: [f64; D]| {
             let x = &self.mesh.space.in_scene(x)[..D];
-            displacement::Exact {
-                value: std::array::from_fn(|i| exact[i].eval(x)),
-                gradient: std::array::from_fn(|i| std::array::from_fn(|j| exact[i].eval_by(j, x).1)),
-            }
+            let gradient = std::array::from_fn(|i| std::array::from_fn(|j| exact[i].eval_by(j, x).1));
+            (std::array::from_fn(|i| exact[i].eval(x)), gradient)
         };
-        let norms = displacement::norms_of_error(&self.mesh.space, self.owned(), &self.elasticity, &self.nodal(v), &at);
-        Some(norms.map(|norms| [norms.l2, norms.h1, norms.energy]))
+        let (space, u) = (&self.mesh.space, self.nodal(v));
+        Some(displacement::norms_of_error(space, self.owned(), &self.elasticity, &u, &at))
     }
 }
 

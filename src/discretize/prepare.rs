@@ -5,9 +5,9 @@
 use super::assembly::Factory;
 use super::body_mesh::BodyMesh;
 use super::facts::BodyInfo;
-use super::kept::{EarlierPair, Kept, MatrixInputs};
+use super::kept::{Kept, MatrixInputs};
 use super::meshes::{KeptMeshes, Meshes};
-use super::pairs::{self, Contact, ContactFacts, Contacts};
+use super::pairs::{self, Contact, ContactFacts};
 use super::partition::{BodyRanks, Partition};
 use super::scene_body::{SceneBody, parts};
 use super::verify::Verified;
@@ -17,9 +17,8 @@ use crate::contact::{self, ContactPair};
 use crate::error::Result;
 use crate::exchange::Plain;
 use crate::fem::Frame;
-use crate::fem::rigid::AtDofs;
 use crate::mesh::{BodyCheck, Mesh};
-use crate::model::{BodyFacts, BodySlot, InterfaceDofs, Mechanism, Segment, slenderness};
+use crate::model::{BodyFacts, BodySlot, Mechanism, Segment, interface_dofs, slenderness};
 use crate::problem::Order;
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
@@ -107,7 +106,7 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     ranks: usize,
     factory: &mut F,
     kept: &mut Kept<D>,
-    pairs: Vec<EarlierPair>,
+    pairs: Vec<(ContactPair, ContactFacts)>,
 ) -> Result<(ReplicatedProblem<D, F::SolverPlan>, WholeProblem<'a, D>)> {
     let Request { scene, verified, cut, keep } = *request;
     let keep = keep.is_some();
@@ -116,7 +115,7 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     let mut bodies = parts(scene, verified, &before.spaces())?;
     kept.bodies = bodies.iter().map(MatrixInputs::of).collect();
     let earlier_pairs = before.serving_pairs(&kept.bodies, pairs);
-    let Contacts { all, searched } = pairs::all(scene, mesh, cut, &bodies, keep, earlier_pairs)?;
+    let (all, searched) = pairs::all(scene, mesh, cut, &bodies, keep, earlier_pairs)?;
     let (mut pairs, mut contacts, mut fine) = (Vec::new(), Vec::new(), Vec::new());
     for Contact { pair, facts, inputs } in all {
         pairs.push(pair);
@@ -199,13 +198,12 @@ fn plan<const D: usize, F: Factory>(
     let of_body = |(SceneBody { spec, mesh, .. }, checked): (&SceneBody<D>, &BodyCheck)| {
         let rigid_modes = mesh.rigid_modes();
         let at = |k: usize, dof: usize| mesh.dof_of(&rigid_modes[k], dof);
-        let motions = AtDofs { count: rigid_modes.len(), at: &at };
-        let interface = InterfaceDofs::new(&mesh.rows, &mesh.prescribed(), motions);
+        let interface = interface_dofs(&mesh.rows, &mesh.prescribed(), rigid_modes.len(), at);
         let facts = BodyFacts {
             name: spec.name.value.clone(),
             dimension: D,
             dofs: mesh.space.dofs(),
-            interface: interface.dofs.len(),
+            interface: interface.len(),
             is_quadratic: mesh.space.order > Order::P1,
             slenderness: slenderness(mesh.extent.size(), checked.surface, mesh.space.measure()),
             ..BodyFacts::default()
