@@ -181,64 +181,46 @@ fn largest_principal(strain: &[f64; 6]) -> f64 {
     first.abs().max(last.abs())
 }
 
-/// The norms of a displacement of one body.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Norms {
-    /// L2 norm: root of the integral of u.u.
-    pub l2: f64,
-    /// H1 seminorm: root of the integral of grad u : grad u, plus (u_r/r)^2 in bodies of revolution.
-    pub h1: f64,
-    /// Energy norm: root of twice the strain energy, the integral of eps : C eps with the strain eps of u, without the
-    /// initial strain.
-    pub energy: f64,
-}
-
-/// A known displacement u at a point.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Exact<const D: usize> {
-    /// Components u_i.
-    pub value: [f64; D],
-    /// Derivatives du_i/dx_j.
-    pub gradient: [[f64; D]; D],
-}
-
 /// Return the norms of u_h - u and of u, in this order, over some cells of a space, by a rule exact to degree five, or
-/// that of products of two displacements and one more.
+/// that of products of two displacements and one more. They are roots of integrals:
 ///
-/// The argument `u` is the finite element displacement u_h, one entry a dof, and `exact` is the known displacement u.
-/// Points without elasticity, which assembly refuses, count without energy. The norms are NaN where `exact` is not
-/// finite.
+/// - the L2 norm, of u.u,
+/// - the H1 seminorm, of grad u : grad u, plus (u_r/r)^2 in bodies of revolution,
+/// - the energy norm, of eps : C eps with the strain eps of u, without the initial strain.
+///
+/// The argument `u` is the finite element displacement u_h, one entry a dof, and `exact` gives the components u_i of
+/// the known displacement and their derivatives du_i/dx_j. Points without elasticity, which assembly refuses, count
+/// without energy. The norms are NaN where `exact` is not finite.
 pub fn norms_of_error<const D: usize>(
     space: &Space<D>,
     cells: impl Iterator<Item = usize>,
     elasticity: &Elasticity,
     u: &[f64],
-    exact: &dyn Fn([f64; D]) -> Exact<D>,
-) -> [Norms; 2] {
+    exact: &dyn Fn([f64; D]) -> ([f64; D], [[f64; D]; D]),
+) -> [[f64; 3]; 2] {
     let rule = element::rule_of_products(D + 1, space.order.max(Order::P2)).with_shapes(space.order);
-    let mut squares = [Norms::default(); 2];
+    let mut squares = [[0.0; 3]; 2];
     for index in cells {
         for point in space.points(index, &rule).flatten() {
-            let known = exact(point.at);
+            let (known, gradient) = exact(point.at);
             let value = point.value(u);
-            let exact_slope = Slope { h: known.gradient, hoop: space.hoop(&point.at, known.value[0]) };
+            let exact_slope = Slope { h: gradient, hoop: space.hoop(&point.at, known[0]) };
             let mut difference = point.slope(u);
             difference.add(-1.0, &exact_slope);
-            let error = std::array::from_fn(|i| value[i] - known.value[i]);
+            let error = std::array::from_fn(|i| value[i] - known[i]);
             let material = elasticity.at(index, space.in_scene(point.at)).ok();
             let initial = elasticity.initial_strain(index, space.in_scene(point.at)).unwrap_or_default();
-            let of_both = [(error, difference, [0.0; 6]), (known.value, exact_slope, initial)];
+            let of_both = [(error, difference, [0.0; 6]), (known, exact_slope, initial)];
             for (sum, (value, slope, initial)) in squares.iter_mut().zip(of_both) {
                 let strain = slope.strain();
                 let strain = std::array::from_fn(|i| strain[i] - initial[i]);
                 let stress = material.map_or([0.0; 6], |material| material.stress(&strain));
-                sum.l2 += point.weight * value.iter().map(|v| v * v).sum::<f64>();
-                sum.h1 += point.weight * slope.square();
-                sum.energy += point.weight * dot(&stress, &strain);
+                let integrands = [value.iter().map(|v| v * v).sum::<f64>(), slope.square(), dot(&stress, &strain)];
+                (0..3).for_each(|k| sum[k] += point.weight * integrands[k]);
             }
         }
     }
-    squares.map(|sum| Norms { l2: sum.l2.sqrt(), h1: sum.h1.sqrt(), energy: sum.energy.sqrt() })
+    squares.map(|sum| sum.map(f64::sqrt))
 }
 
 #[cfg(test)]

@@ -19,15 +19,8 @@ pub struct Elasticity {
     regions: Vec<MaterialRegion>,
     /// Region of each cell; empty if all cells have the first one.
     of_cell: Vec<usize>,
-    /// Temperature above that of the stress-free body, if there is one.
-    temperature: Option<Temperature>,
-}
-
-/// The temperature of a body in a load step.
-#[derive(Debug, Clone)]
-struct Temperature {
-    field: Field,
-    factor: f64,
+    /// Temperature above that of the stress-free body, if there is one, and its factor in a load step.
+    temperature: Option<(Field, f64)>,
 }
 
 /// The elastic constants of one region of a body.
@@ -93,7 +86,7 @@ impl Elasticity {
     /// Return the elasticity at `factor` times this temperature above that of the stress-free body.
     #[must_use]
     pub fn heated(self, field: Field, factor: f64) -> Self {
-        Self { temperature: Some(Temperature { field, factor }), ..self }
+        Self { temperature: Some((field, factor)), ..self }
     }
 
     /// Return whether the body has a temperature.
@@ -106,7 +99,7 @@ impl Elasticity {
     /// # Errors
     /// A temperature or an expansion that is not finite there.
     pub fn initial_strain(&self, cell: usize, x: [f64; 3]) -> Result<[f64; 6], Flaw> {
-        let Some(Temperature { field, factor }) = &self.temperature else { return Ok([0.0; 6]) };
+        let Some((field, factor)) = &self.temperature else { return Ok([0.0; 6]) };
         let temperature = factor * field.eval(x);
         if !temperature.is_finite() {
             return Err(Flaw::Constant("temperature", temperature, FINITE));
