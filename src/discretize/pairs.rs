@@ -71,21 +71,21 @@ pub struct ContactFacts {
     /// Mesh of side a, for output.
     pub surface: ContactSurface,
     /// Facets of both sides that face each other.
-    pub facing: Vec<FacetPair>,
+    pub facing: Vec<FacingFacets>,
     /// The ways of a fluid along the surface, if the scene names two ends of it.
     pub seal: Option<Seal>,
 }
 
 /// A facet of side a and one of side b that face each other.
 #[derive(Serialize, Deserialize)]
-pub struct FacetPair {
+pub struct FacingFacets {
     /// Corners of both facets ([`corners`]). Before an obstacle both are the facet itself.
     pub facets: [[u32; 3]; 2],
     /// Contact points on the facet of side a.
     pub points: Vec<usize>,
 }
 
-impl FacetPair {
+impl FacingFacets {
     /// Return the facets of both sides with a common piece, sorted.
     fn all<const D: usize>(
         parts: &[SceneBody<D>],
@@ -414,7 +414,7 @@ impl<'a, const D: usize> SurfacePair<'a, D> {
         }
         let chords = if is_touching { None } else { Chords::of(&a, &b, &common, &pair) };
         let ends = spec.distance.map_or(Vec::new(), |_| contact::ends(&a, &common, &pair, &far));
-        let facing = FacetPair::all(parts, [&a, &b], &common, &pair);
+        let facing = FacingFacets::all(parts, [&a, &b], &common, &pair);
         let fine = fine.map(Rc::new);
         Ok(Some(Contact {
             pair,
