@@ -14,7 +14,6 @@ mod marks;
 mod mechanism;
 pub mod meshes;
 mod obstacle;
-mod owned_dofs;
 mod pairs;
 mod partition;
 mod patterns;
@@ -180,8 +179,8 @@ where
     };
     let part = |rank| prepared.as_ref().map_or_else(Vec::new, |whole| whole.on(rank));
     let mut locals: Vec<Option<BodyMesh<D>>> = scatter(&**exchange, part)?;
-    for owned in locals.iter_mut().flatten().filter_map(|local| local.owned.as_mut()) {
-        owned.distribution.exchange = exchange.clone();
+    for distribution in locals.iter_mut().flatten().filter_map(|local| local.distribution.as_mut()) {
+        distribution.exchange = exchange.clone();
     }
     Ok(locals)
 }

@@ -39,7 +39,7 @@ pub struct MeshArgs {
 
 /// What is printed about a mesh.
 #[derive(Serialize)]
-struct MeshFacts {
+struct MeshSummary {
     title: String,
     file: PathBuf,
     origin: &'static str,
@@ -51,12 +51,12 @@ struct MeshFacts {
     nodes: usize,
     /// A line for each group of cells that is split into bodies.
     splits: Vec<String>,
-    bodies: Vec<BodyFacts>,
-    groups: Vec<GroupFacts>,
+    bodies: Vec<BodySummary>,
+    groups: Vec<GroupSummary>,
 }
 
 #[derive(Serialize)]
-struct BodyFacts {
+struct BodySummary {
     name: String,
     cells: usize,
     nodes: usize,
@@ -67,7 +67,7 @@ struct BodyFacts {
 }
 
 #[derive(Serialize)]
-struct GroupFacts {
+struct GroupSummary {
     name: String,
     dimension: usize,
     simplices: usize,
@@ -104,7 +104,7 @@ pub fn mesh(interrupt: &Interrupt, request: &MeshArgs) -> Result<i32> {
 
 /// Return the facts of a mesh, or of a shape or script that Gmsh meshes: in space, or in the plane where it has no
 /// cells in space.
-fn of_file(interrupt: &Interrupt, request: &MeshArgs) -> Result<MeshFacts> {
+fn of_file(interrupt: &Interrupt, request: &MeshArgs) -> Result<MeshSummary> {
     if let Some(set) = request.overrides.first() {
         return Err(Error::new(
             Kind::Usage,
@@ -123,7 +123,7 @@ fn facts<const D: usize>(
     scene: Option<&Scene>,
     interrupt: &Interrupt,
     request: &MeshArgs,
-) -> Result<MeshFacts> {
+) -> Result<MeshSummary> {
     let read = scene.map_or_else(|| crate::mesh::files(source), inputs);
     request.output.as_ref().map_or(Ok(()), |path| check_output(path, &read))?;
     let orders: Vec<_> = scene.into_iter().flat_map(|scene| &scene.bodies).map(|body| body.order).collect();
@@ -134,7 +134,7 @@ fn facts<const D: usize>(
     let seconds = began.elapsed().as_secs_f64();
     request.output.as_ref().map_or(Ok(()), |path| write::<D>(path, &file))?;
     let of_mesh = [in_parts(mesh.split), made_straight(mesh.straightened)];
-    let mut facts = MeshFacts {
+    let mut facts = MeshSummary {
         title: request.scene.display().to_string(),
         file,
         origin: match origin {
@@ -161,14 +161,14 @@ fn facts<const D: usize>(
     Ok(facts)
 }
 
-fn bodies<const D: usize>(verified: &Verified<D>) -> Result<Vec<BodyFacts>> {
+fn bodies<const D: usize>(verified: &Verified<D>) -> Result<Vec<BodySummary>> {
     let mesh = &verified.mesh;
     // bodies without cells, which are refused here, were not checked
     let facts = |(index, body): (usize, &BodySpec)| {
         let group = find_group(mesh, &body.name, &[D], "body")?;
         let checked = &verified.checked[index];
         let space = Space::new(mesh, group, body.order.unwrap_or_default());
-        Ok(BodyFacts {
+        Ok(BodySummary {
             name: body.name.value.clone(),
             cells: group.len(),
             nodes: space.nodes.len(),
@@ -181,32 +181,32 @@ fn bodies<const D: usize>(verified: &Verified<D>) -> Result<Vec<BodyFacts>> {
     verified.bodies.iter().enumerate().map(facts).collect()
 }
 
-fn group_facts<const D: usize>(mesh: &Mesh<D>) -> Vec<GroupFacts> {
+fn group_facts<const D: usize>(mesh: &Mesh<D>) -> Vec<GroupSummary> {
     let of_group = |(group, surface): (&Group, SurfaceFacts)| {
         let points = group.connectivity.iter().map(|&point| mesh.in_scene(mesh.points[point as usize]));
         let [low, high] = bounds(points).map(|corner| corner[..D].to_vec());
         let SurfaceFacts { bodies: bounds, shape } = surface;
         let (name, dimension, simplices) = (group.name.to_string(), group.dimension, group.len());
-        GroupFacts { name, dimension, simplices, low, high, bounds, shape }
+        GroupSummary { name, dimension, simplices, low, high, bounds, shape }
     };
     mesh.groups.iter().zip(shapes::of_groups(mesh)).map(of_group).collect()
 }
 
 /// Return the facts as lines for people.
-fn in_lines(facts: &MeshFacts) -> String {
-    let MeshFacts { title, file, origin, seconds, nodes, order, .. } = facts;
+fn in_lines(facts: &MeshSummary) -> String {
+    let MeshSummary { title, file, origin, seconds, nodes, order, .. } = facts;
     let mut lines =
         vec![title.clone(), format!("  {} ({origin}, {seconds:.2} s): {nodes} nodes, order {order}", file.display())];
     lines.extend(facts.splits.iter().map(|line| format!("  {line}")));
-    for BodyFacts { name, cells, nodes, dofs, .. } in &facts.bodies {
+    for BodySummary { name, cells, nodes, dofs, .. } in &facts.bodies {
         lines.push(format!("  body {name}: {cells} cells, {nodes} nodes, {dofs} dofs"));
     }
     lines.extend(facts.warnings.iter().map(|warning| format!("  warning: {warning}")));
     let sizes = facts.groups.iter().flat_map(|group| group.low.iter().chain(&group.high));
     let roundoff = f64::EPSILON * sizes.fold(0.0, |most: f64, x| most.max(x.abs()));
     // bodies have lines of their own
-    let is_listed = |group: &&GroupFacts| group.dimension < facts.dimension || facts.bodies.is_empty();
-    let mut listed: Vec<&GroupFacts> = facts.groups.iter().filter(is_listed).collect();
+    let is_listed = |group: &&GroupSummary| group.dimension < facts.dimension || facts.bodies.is_empty();
+    let mut listed: Vec<&GroupSummary> = facts.groups.iter().filter(is_listed).collect();
     // shapes have many points, which few look for
     listed.sort_by_key(|group| Reverse(group.dimension));
     for group in listed {

@@ -18,7 +18,7 @@ mod slip;
 pub use basis::PressureBasis;
 pub use fine::{Fine, FinePoint, FinePoints};
 pub use mirror::Mirrors;
-pub use pair::{ContactPair, ENTRY_ROUNDING, Fault, Measure, add, assemble, moment_in_scene};
+pub use pair::{ContactPair, ENTRY_ROUNDING, Measure, PairFault, add, assemble, moment_in_scene};
 pub use pieces::Coverage;
 pub use review::{Chords, ends};
 pub use side::Side;

@@ -108,7 +108,7 @@ fn no_law() -> Law {
 
 /// Why a pair could not be assembled.
 #[derive(Debug)]
-pub enum Fault {
+pub enum PairFault {
     /// The surfaces do not face each other anywhere.
     NoPartner,
     /// The scene's gap is not finite at this point.
@@ -163,7 +163,7 @@ fn integrate<const D: usize>(
 /// the layer's law for the contact points.
 ///
 /// # Errors
-/// [`Fault`] if nothing is covered, the gap is not finite, or the law is invalid.
+/// [`PairFault`] if nothing is covered, the gap is not finite, or the law is invalid.
 pub fn assemble<const D: usize>(
     a: &Side<D>,
     b: &Side<D>,
@@ -171,19 +171,19 @@ pub fn assemble<const D: usize>(
     common: &Intersection<D>,
     gap: &dyn Fn([f64; 3]) -> f64,
     law: &LawMaker,
-) -> Result<ContactPair, Fault> {
+) -> Result<ContactPair, PairFault> {
     let (points, cover) = integrate(a, b, common);
     let tiny = 1e-12 * points.values().map(|point| point.weight).fold(0.0, f64::max);
     let on_side = along(a, points.iter().filter(|(_, p)| p.weight > tiny).map(|(&at, _)| at));
     if on_side.is_empty() {
-        return Err(Fault::NoPartner);
+        return Err(PairFault::NoPartner);
     }
     let points: Vec<&Accumulator> = on_side.iter().map(|at| &points[at]).collect();
     let nodes: Vec<&FaceNode<D>> = on_side.iter().map(|&at| &a.nodes[at as usize]).collect();
     // a pressure acts on the area across its direction, on either side
     let across = |(point, at): (&&Accumulator, &&FaceNode<D>)| point.weight * dot(&at.normal, &at.direction);
     let position: Vec<[f64; 3]> = points.iter().map(|point| point.position(a)).collect();
-    let law = law(&position).map_err(Fault::Law)?;
+    let law = law(&position).map_err(PairFault::Law)?;
     let mut pair = ContactPair {
         surfaces: [a.name.to_owned(), b.name.to_owned()],
         bodies,
@@ -348,11 +348,11 @@ impl ContactPair {
     /// Let the scene add `own(x)` to the distance of the meshes.
     ///
     /// # Errors
-    /// [`Fault::Gap`] if that is not finite at a point.
-    pub fn set_gap(&mut self, own: &dyn Fn([f64; 3]) -> f64) -> Result<(), Fault> {
+    /// [`PairFault::Gap`] if that is not finite at a point.
+    pub fn set_gap(&mut self, own: &dyn Fn([f64; 3]) -> f64) -> Result<(), PairFault> {
         let gap = |(distance, &x): (&f64, &[f64; 3])| match own(x) {
             own if own.is_finite() => Ok(distance + own),
-            _ => Err(Fault::Gap(x)),
+            _ => Err(PairFault::Gap(x)),
         };
         self.gap = self.distance.iter().zip(&self.position).map(gap).collect::<Result<_, _>>()?;
         Ok(())

@@ -11,7 +11,7 @@ use crate::fem::assemble::{Defect, InitialLoad};
 use crate::fem::{Loads, NodeGraph, Prolongation, assemble, rigid, support};
 use crate::linalg::{Csr, countable};
 use crate::mesh::Mesh;
-use crate::model::{Body, BodyCounts, BodyFacts, BodySlot, Distribution, InterfaceDofs};
+use crate::model::{Body, BodyCounts, BodyFacts, BodySlot, Distribution};
 use crate::problem::{BodySpec, Plane};
 use std::cell::OnceCell;
 use std::path::Path;
@@ -122,10 +122,10 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
         let mut unconstrained_modes: Vec<Vec<f64>> = modes.map(|motion| mesh.dofs_of(motion)).collect();
         unconstrained_modes.iter_mut().for_each(|motion| prescribed.iter().for_each(|entry| motion[entry.0] = 0.0));
         mesh.graph();
-        let (owned, rows) = (mesh.owned.take(), std::mem::take(&mut mesh.rows));
+        let (distribution, rows) = (mesh.distribution.take(), std::mem::take(&mut mesh.rows));
         let mut graph = mesh.graph.take().unwrap_or_else(|| unreachable!("the graph was requested"));
-        if let Some(owned) = &owned {
-            graph = graph.of(|node| owned.is_own::<D>(node));
+        if let Some(distribution) = &distribution {
+            graph = graph.of(|node| distribution.owned_index(D * node).is_some());
         }
         let mut stiffness = stiffness(spec, fem, &self.mesh.path, &graph)?;
         drop(graph);
@@ -134,12 +134,12 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
         let mut loads = support(&mut stiffness, force, initial, prescribed);
         slot.scale = stiffness.diagonal(0).into_iter().fold(0.0, f64::max);
         slot.row_stiffness = rows.stiffness_of_nodes(&stiffness, D);
-        if let Some(owned) = &owned {
-            (stiffness, loads) = (owned.restrict::<D>(stiffness), owned.distribution.restrict(loads));
+        if let Some(distribution) = &distribution {
+            (stiffness, loads) = (distribution.restrict_stiffness(stiffness), distribution.restrict(loads));
         }
         let mesh = &fem.mesh;
-        let interpolation = self.factory.wants_interpolation(&slot.name).then(|| match &owned {
-            Some(owned) => owned.interpolation::<D>(|coarse| mesh.interpolation(coarse)),
+        let interpolation = self.factory.wants_interpolation(&slot.name).then(|| match &distribution {
+            Some(owned) => owned.restrict_interpolation(&mesh.interpolation(&owned.coarse_nodes), D),
             None => mesh.interpolation(&mesh.coarse_nodes()),
         });
         // Multigrid must represent motions with hardly any strain. Far from the axis, a ring is nearly as soft against
@@ -150,7 +150,7 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
             dimension: D,
             stiffness,
             loads,
-            distribution: owned.map(|owned| owned.distribution),
+            distribution,
             rows,
             near_null_space: &near_null_space,
             unconstrained_modes,
@@ -210,12 +210,13 @@ pub trait Factory {
     /// The choice of solvers of all bodies.
     type SolverPlan: Plain;
 
-    /// Choose the solvers of all bodies, in the order of the scene, on the first rank. `is_kept` says whether each body
-    /// has the matrix of the problem before, and then also whether its solver serves.
+    /// Choose the solvers of all bodies, in the order of the scene, on the first rank: their facts, and the dofs to
+    /// which each could be condensed. `is_kept` says whether each body has the matrix of the problem before, and then
+    /// also whether its solver serves.
     ///
     /// # Errors
     /// PETSc lacks a solver that the scene asks for.
-    fn plan(&mut self, bodies: Vec<(BodyFacts, InterfaceDofs)>, is_kept: &mut [bool]) -> Result<Self::SolverPlan>;
+    fn plan(&mut self, bodies: Vec<(BodyFacts, Vec<usize>)>, is_kept: &mut [bool]) -> Result<Self::SolverPlan>;
 
     /// Follow the plan of the first rank on another rank.
     fn adopt(&mut self, plan: Self::SolverPlan);

@@ -1,7 +1,6 @@
 //! The mesh of a body with all that is tied to its nodes: on the first rank the whole body, on every rank the part that
 //! it needs, with local numbers.
 
-use super::owned_dofs::OwnedDofs;
 use super::supports::Constraints;
 use crate::contact::ENTRY_ROUNDING;
 use crate::exchange::Plain;
@@ -11,6 +10,7 @@ use crate::fem::{
     rigid,
 };
 use crate::linalg::{Blocks, Csr, TOLERANCE, dot};
+use crate::model::Distribution;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use std::cell::OnceCell;
@@ -47,8 +47,8 @@ pub struct BodyMesh<const D: usize> {
     pub motions: Vec<RigidMotion<D>>,
     /// Number of the free motions.
     pub free: usize,
-    /// Dofs of this rank, if the body is distributed.
-    pub owned: Option<OwnedDofs>,
+    /// How its dofs are distributed over the ranks, if they are.
+    pub distribution: Option<Distribution>,
     /// Whether this rank owns the body or nodes of it. Other ranks have it for estimates of the error.
     pub is_owned: bool,
     /// Coupling of nodes by K, once it was requested on this rank.
@@ -59,8 +59,9 @@ pub struct BodyMesh<const D: usize> {
 impl<const D: usize> BodyMesh<D> {
     /// Return whether this rank owns each node.
     pub fn own_nodes(&self) -> Vec<bool> {
-        let is_own = |node| self.owned.as_ref().is_none_or(|s| s.is_own::<D>(self.held.frame.node(node) as usize));
-        (0..self.space.nodes.len() as u32).map(is_own).collect()
+        let first_dof = |node: u32| D * self.held.frame.node(node) as usize;
+        let is_own = |dof: usize| self.distribution.as_ref().is_none_or(|owned| owned.owned_index(dof).is_some());
+        (0..self.space.nodes.len() as u32).map(|node| is_own(first_dof(node))).collect()
     }
 
     /// Return the coupling of the nodes by K, which is computed when it is first requested.

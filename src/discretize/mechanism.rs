@@ -1,8 +1,9 @@
 //! Rigid motions of bodies, alone or together, that neither supports nor springs nor contact resist.
 //!
 //! A body may slide on a plane, halves of a ring of blocks may slide on each other, and a group of bodies without
-//! supports may move as one. These motions close no point of contact ([`Squares`]), among the motions that supports and
-//! springs leave to each body. Motions of a whole group come first, so that they are found and named as such.
+//! supports may move as one. These motions close no point of contact ([`ClosingSquares`]), among the motions that
+//! supports and springs leave to each body. Motions of a whole group come first, so that they are found and named as
+//! such.
 //!
 //! Facets resist motions that smooth surfaces do not, such as the turn of a pin in a hub, because their normals lean
 //! (docs/theory.md, "Motions that nothing holds"). Such motions count as free.
@@ -152,8 +153,8 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
     ///
     /// Motions are of size one. So a motion that closes less than the error of the normals is free, and so is one that
     /// closes less than the root of [`TOLERANCE`], the error of coordinates on curves.
-    fn kernel(&self, squares: &Squares) -> Vec<DVector<f64>> {
-        let Squares { closing, leaning, .. } = squares;
+    fn kernel(&self, squares: &ClosingSquares) -> Vec<DVector<f64>> {
+        let ClosingSquares { closing, leaning, .. } = squares;
         let mut held = closing.clone();
         leaning.stored().for_each(|(i, j, block)| held.add(i, j, &(-DOUBT * block)));
         let held = held.factor_unscaled(self.tolerance());
@@ -185,11 +186,11 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
         TOLERANCE.max(self.tilt * self.tilt)
     }
 
-    /// Return the [`Squares`] of all pairs.
+    /// Return the [`ClosingSquares`] of all pairs.
     ///
     /// The displacement between the two sides is that of both motions at the position of the point. So bodies that move
     /// as one close nothing, whatever the rows of a mesh say where curved surfaces are apart.
-    fn squares(&self) -> Squares {
+    fn squares(&self) -> ClosingSquares {
         let sizes: Vec<usize> = (0..self.bodies.len()).map(|body| self.unconstrained(body).len()).collect();
         let [mut closing, mut leaning, mut error] = [0; 3].map(|_| Blocks::new(&sizes));
         for pair in self.pairs.iter().filter(|pair| pair.bodies[0] != pair.bodies[1]) {
@@ -209,7 +210,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
                 }
             }
         }
-        Squares { closing, leaning, error }
+        ClosingSquares { closing, leaning, error }
     }
 
     /// Turn the normals of all pairs across the motions that are fixed, so that contact does not resist them to the
@@ -452,7 +453,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
 
 /// Quadratic forms of the motions of all bodies. Let u be the displacement between the two sides at a point with the
 /// normal n.
-struct Squares {
+struct ClosingSquares {
     /// Mean squares of the closings n.u, summed over pairs.
     closing: Blocks,
     /// Mean squares of (n_f - n).u with the normals n_f of the facets around.
@@ -462,7 +463,7 @@ struct Squares {
     error: Blocks,
 }
 
-impl Squares {
+impl ClosingSquares {
     /// Return whether a motion differs from another by no more than the error of that one.
     fn is_near(&self, motion: &DVector<f64>, other: &DVector<f64>) -> bool {
         self.closing.energy(motion) <= self.closing.energy(other) + self.error.energy(other)

@@ -9,7 +9,7 @@ use super::scene_body::SceneBody;
 use super::seal::{self, Seal, Sealing};
 use crate::contact::law::{self, OwnLaws};
 use crate::contact::pieces::{Cut, Intersection, Reach};
-use crate::contact::{self, Chords, ContactPair, Fault, Fine, Mirrors, Side, Tangents, Turns};
+use crate::contact::{self, Chords, ContactPair, Fine, Mirrors, PairFault, Side, Tangents, Turns};
 use crate::error::{Error, Located, Result};
 use crate::fem::{Facets, jumping, minus, unit};
 use crate::linalg::{bounds, dot};
@@ -79,21 +79,21 @@ pub struct ContactFacts {
     /// Mesh of side a, for output.
     pub surface: ContactSurface,
     /// Facets of both sides that face each other.
-    pub facing: Vec<Facing>,
+    pub facing: Vec<FacingFacets>,
     /// The ways of a fluid along the surface, if the scene names two ends of it.
     pub seal: Option<Seal>,
 }
 
 /// A facet of side a and one of side b that face each other.
 #[derive(Serialize, Deserialize)]
-pub struct Facing {
+pub struct FacingFacets {
     /// Corners of both facets ([`corners`]). Before an obstacle both are the facet itself.
     pub facets: [[u32; 3]; 2],
     /// Contact points on the facet of side a.
     pub points: Vec<usize>,
 }
 
-impl Facing {
+impl FacingFacets {
     /// Return the facets of both sides with a common piece, sorted.
     fn all<const D: usize>(
         parts: &[SceneBody<D>],
@@ -394,7 +394,7 @@ impl<'a, const D: usize> SurfacePair<'a, D> {
         let gap = |x| spec.gap.eval(x);
         let law = |position: &[[f64; 3]]| law::of_pair(&spec, &scene.laws, position);
         let mut pair = match contact::assemble(&a, &b, bodies, &common, &gap, &law) {
-            Err(Fault::NoPartner) if is_found => return Ok(None),
+            Err(PairFault::NoPartner) if is_found => return Ok(None),
             assembled => assembled.map_err(|fault| refuse(&spec, fault, || why(&a, &b, cut)))?,
         };
         pair.surfaces = surfaces;
@@ -422,7 +422,7 @@ impl<'a, const D: usize> SurfacePair<'a, D> {
         }
         let chords = if is_touching { None } else { Chords::of(&a, &b, &common, &pair) };
         let ends = spec.distance.map_or(Vec::new(), |_| contact::ends(&a, &common, &pair, &far));
-        let facing = Facing::all(parts, [&a, &b], &common, &pair);
+        let facing = FacingFacets::all(parts, [&a, &b], &common, &pair);
         // all that the pressure functions of facets are needed for is done
         pair.cover.iter_mut().for_each(|cover| cover.basis = None);
         let fine = fine.map(Rc::new);
@@ -464,17 +464,17 @@ pub fn of_pair(spec: &ContactSpec) -> String {
 }
 
 /// Return the error of a pair. `why` says where its surfaces are nearest to each other.
-fn refuse(spec: &ContactSpec, fault: Fault, why: impl Fn() -> String) -> Error {
+fn refuse(spec: &ContactSpec, fault: PairFault, why: impl Fn() -> String) -> Error {
     match fault {
-        Fault::Law(error) => error.because(of_pair(spec)),
-        Fault::NoPartner => {
+        PairFault::Law(error) => error.because(of_pair(spec)),
+        PairFault::NoPartner => {
             let [a, b] = spec.between.each_ref().map(|name| &name.value);
             let message = format!("`{a}` and `{b}` do not face each other anywhere");
             Error::scene(&spec.between[0].place, message)
                 .because(why())
                 .help("name the sides of the bodies that look at each other (`winkler mesh` has their places), move a body, or give a larger `distance` or `angle`")
         }
-        Fault::Gap(x) => {
+        PairFault::Gap(x) => {
             spec.gap.eval_finite("the gap", x).err().map(|error| error.because(of_pair(spec))).unwrap_or_else(|| {
                 let message = format!("the gap is beyond the range of numbers at {}", point(x));
                 Error::scene(&spec.between[0].place, message)

@@ -2,7 +2,6 @@
 //! number in that matrix. The coupling of the nodes determines the work and the memory of each.
 
 use super::body_mesh::BodyMesh;
-use super::owned_dofs::OwnedDofs;
 use super::scene_body::SceneBody;
 use crate::contact::ContactPair;
 use crate::exchange::Serial;
@@ -32,16 +31,16 @@ pub struct Partition {
     /// Rank that owns each node of each body.
     owner: Vec<Vec<u32>>,
     /// Numbers of all nodes of each body.
-    nodes: Numbers,
+    nodes: NodeNumbers,
     /// Numbers of the nodes of each body from which displacements are interpolated, if an interpolation is requested.
-    coarse: Numbers,
+    coarse: NodeNumbers,
     /// [`BodyMesh::products`] of each body.
     products: Vec<DMatrix<f64>>,
 }
 
 /// Numbers of nodes of the bodies in one matrix. They run rank by rank, within a rank body by body, and within a body
 /// in the order of the nodes.
-struct Numbers {
+struct NodeNumbers {
     /// Number of each node of each body; [`NONE`] for nodes without a number.
     of_node: Vec<Vec<u32>>,
     /// Count of the nodes of each body on each rank: `counts[rank][body]`.
@@ -52,7 +51,7 @@ struct Numbers {
 /// with a sign.
 const NONE: u32 = u32::MAX;
 
-impl Numbers {
+impl NodeNumbers {
     /// Number the nodes for which `is_counted(body, node)` is true.
     fn new(owner: &[Vec<u32>], ranks: usize, is_counted: impl Fn(usize, u32) -> bool) -> Self {
         let is_counted = &is_counted;
@@ -110,8 +109,8 @@ impl Partition {
         let coarse_nodes =
             |&body: &usize| if wants_coarse(body) { bodies[body].mesh.coarse_nodes() } else { Vec::new() };
         let coarse: Vec<Vec<u32>> = set.iter().map(coarse_nodes).collect();
-        let nodes = Numbers::new(&owner, ranks, |_, _| true);
-        let coarse = Numbers::new(&owner, ranks, |body, node| coarse[body].binary_search(&node).is_ok());
+        let nodes = NodeNumbers::new(&owner, ranks, |_, _| true);
+        let coarse = NodeNumbers::new(&owner, ranks, |body, node| coarse[body].binary_search(&node).is_ok());
         let products = set.iter().map(|&body| bodies[body].mesh.products()).collect();
         Self { bodies: set, ranks, owner, nodes, coarse, products }
     }
@@ -169,7 +168,7 @@ impl Partition {
             free: body.free,
             is_owned: true,
             graph: OnceCell::new(),
-            owned: Some(self.owned::<D>(number, &nodes, &body.rows, rank)),
+            distribution: Some(self.distribution::<D>(number, &nodes, &body.rows, rank)),
         }
     }
 
@@ -199,8 +198,8 @@ impl Partition {
         Space::<D>::among(own.chain(of_cells).chain(of_rows).chain(held.frame.leaders()))
     }
 
-    /// Return the dofs of a rank that has these `nodes` of a body. `rows` are the contact rows of the body.
-    fn owned<const D: usize>(&self, number: usize, nodes: &[u32], rows: &Csr, rank: usize) -> OwnedDofs {
+    /// Return what a rank with these `nodes` of a body has of its dofs. `rows` are the contact rows of the body.
+    fn distribution<const D: usize>(&self, number: usize, nodes: &[u32], rows: &Csr, rank: usize) -> Distribution {
         let numbers = &self.nodes.of_node[number];
         let dofs = |node: u32| D as u32 * node..D as u32 * (node + 1);
         let mut others = vec![(Vec::new(), Vec::new()); self.ranks];
@@ -219,7 +218,9 @@ impl Partition {
         let before: usize = self.nodes.counts[rank][..number].iter().sum();
         let total = D * self.nodes.sum(0..self.ranks);
         let column = |dof: usize| Some(D * numbers[dof / D] as usize + dof % D);
-        let distribution = Distribution {
+        let coarse = (0..).zip(nodes).map(|(place, &node)| (place, self.coarse.of_node[number][node as usize]));
+        let (coarse_nodes, coarse_number) = coarse.filter(|(_, coarse)| *coarse != NONE).unzip();
+        Distribution {
             dofs: D * numbers.len(),
             first: D * (start + before),
             start: D * start,
@@ -230,17 +231,11 @@ impl Partition {
             total,
             rows: rows.of_columns(total, column),
             leads: self.leader(number) == rank,
-            exchange: Rc::new(Serial),
-        };
-        let coarse = (0..).zip(nodes).map(|(place, &node)| (place, self.coarse.of_node[number][node as usize]));
-        let (of_coarse, coarse) = coarse.filter(|(_, coarse)| *coarse != NONE).unzip();
-        OwnedDofs {
-            distribution,
-            coarse_nodes: of_coarse,
-            coarse_number: coarse,
+            coarse_nodes,
+            coarse_number,
             coarse_count: self.coarse.sum(0..self.ranks),
             own_coarse: self.coarse.counts[rank][number],
-            number: nodes.iter().map(|&node| numbers[node as usize]).collect(),
+            exchange: Rc::new(Serial),
         }
     }
 }

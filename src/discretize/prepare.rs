@@ -17,9 +17,8 @@ use crate::contact::{self, ContactPair};
 use crate::error::Result;
 use crate::exchange::Plain;
 use crate::fem::Frame;
-use crate::fem::rigid::AtDofs;
 use crate::mesh::{BodyCheck, Mesh};
-use crate::model::{BodyFacts, BodySlot, InterfaceDofs, Mechanism, Segment, slenderness};
+use crate::model::{BodyFacts, BodySlot, Mechanism, Segment, interface_dofs, slenderness};
 use crate::problem::Order;
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
@@ -199,13 +198,12 @@ fn plan<const D: usize, F: Factory>(
     let of_body = |(SceneBody { spec, mesh, .. }, checked): (&SceneBody<D>, &BodyCheck)| {
         let rigid_modes = mesh.rigid_modes();
         let at = |k: usize, dof: usize| mesh.dof_of(&rigid_modes[k], dof);
-        let motions = AtDofs { count: rigid_modes.len(), at: &at };
-        let interface = InterfaceDofs::new(&mesh.rows, &mesh.prescribed(), motions);
+        let interface = interface_dofs(&mesh.rows, &mesh.prescribed(), rigid_modes.len(), at);
         let facts = BodyFacts {
             name: spec.name.value.clone(),
             dimension: D,
             dofs: mesh.space.dofs(),
-            interface: interface.dofs.len(),
+            interface: interface.len(),
             is_quadratic: mesh.space.order > Order::P1,
             slenderness: slenderness(mesh.extent.size(), checked.surface, mesh.space.measure()),
             ..BodyFacts::default()

@@ -314,7 +314,7 @@ pub fn parts<'a, const D: usize>(
             load: NodalForces::default(),
             motions: Vec::new(),
             free: 0,
-            owned: None,
+            distribution: None,
             is_owned: true,
             graph: OnceCell::new(),
         };

@@ -115,7 +115,7 @@ impl NodeGraph {
 
     /// Add a block k of nodal stiffness between two nodes to a matrix on this graph, as C'k C in the rows and columns
     /// of the dofs that move them. Rows that the graph lacks are left out.
-    fn add_moved<const D: usize>(&self, [a, b]: [&Node<D>; 2], k: SMatrix<f64, D, D>, matrix: &mut Csr) {
+    fn add_moved<const D: usize>(&self, [a, b]: [&MovedNode<D>; 2], k: SMatrix<f64, D, D>, matrix: &mut Csr) {
         let no_columns = |i: u32, k: SMatrix<f64, D, D>, matrix: &mut Csr| {
             if !self.has(i) {
                 return;
@@ -147,13 +147,13 @@ impl NodeGraph {
 }
 
 /// A node with the dofs that move it.
-struct Node<'a, const D: usize> {
+struct MovedNode<'a, const D: usize> {
     node: u32,
     /// Its row of u = T v; empty if it has its own dofs.
     row: &'a [(u32, SMatrix<f64, D, D>)],
 }
 
-impl<'a, const D: usize> Node<'a, D> {
+impl<'a, const D: usize> MovedNode<'a, D> {
     fn new(node: u32, frame: &'a Frame<D>) -> Self {
         Self { node, row: frame.row(node) }
     }
@@ -204,7 +204,7 @@ pub struct NodalBlock<const D: usize> {
 /// Add springs to a stiffness matrix on a graph.
 pub fn add_blocks<const D: usize>(graph: &NodeGraph, frame: &Frame<D>, blocks: &[NodalBlock<D>], matrix: &mut Csr) {
     for NodalBlock { nodes, block } in blocks {
-        let [a, b] = nodes.map(|node| Node::new(node, frame));
+        let [a, b] = nodes.map(|node| MovedNode::new(node, frame));
         graph.add_moved([&a, &b], SMatrix::from_fn(|i, j| block[i][j]), matrix);
     }
 }
@@ -286,7 +286,7 @@ pub fn stiffness<const D: usize>(
     // Only the blocks with row <= column are set.
     let mut blocks = vec![[[0.0; D]; D]; stride * stride];
     for index in 0..space.cell_count() {
-        let nodes: Vec<Node<D>> = space.cell(index).iter().map(|&node| Node::new(node, frame)).collect();
+        let nodes: Vec<MovedNode<D>> = space.cell(index).iter().map(|&node| MovedNode::new(node, frame)).collect();
         if !nodes.iter().any(|moved| graph.has(frame.node(moved.node))) {
             continue;
         }
@@ -335,7 +335,7 @@ fn affine<const D: usize>(
 }
 
 /// Add the symmetric stiffness matrix of a cell to a matrix.
-fn scatter<const D: usize>(graph: &NodeGraph, nodes: &[Node<D>], blocks: &[[[f64; D]; D]], matrix: &mut Csr) {
+fn scatter<const D: usize>(graph: &NodeGraph, nodes: &[MovedNode<D>], blocks: &[[[f64; D]; D]], matrix: &mut Csr) {
     let stride = nodes.len();
     if nodes.iter().all(|node| node.row.is_empty()) {
         return scatter_free(graph, nodes, blocks, matrix);
@@ -353,7 +353,7 @@ fn scatter<const D: usize>(graph: &NodeGraph, nodes: &[Node<D>], blocks: &[[[f64
 
 /// Add the symmetric stiffness matrix of a cell whose nodes have their own dofs. Rows of the graph are sorted, so that
 /// one walk finds all nodes of the cell.
-fn scatter_free<const D: usize>(graph: &NodeGraph, nodes: &[Node<D>], blocks: &[[[f64; D]; D]], matrix: &mut Csr) {
+fn scatter_free<const D: usize>(graph: &NodeGraph, nodes: &[MovedNode<D>], blocks: &[[[f64; D]; D]], matrix: &mut Csr) {
     let stride = nodes.len();
     let mut sorted: Vec<usize> = (0..stride).collect();
     sorted.sort_unstable_by_key(|&a| nodes[a].node);
@@ -542,18 +542,11 @@ pub struct Loads {
     /// Constant to be added to u'Ku + 2 lifting'u to give twice the strain energy: u_c'K_cc u_c with the original K_cc
     /// less the value with the scaled diagonal, and what initial strains add.
     pub strain_constant: f64,
-    /// Entries of K that [`Loads::reload`] needs; empty where it is not used.
-    pub held: Couplings,
-}
-
-/// The entries of K that were eliminated with the prescribed dofs. Other loads and prescribed values with the same K
-/// need them.
-#[derive(Debug, Clone, Default)]
-pub struct Couplings {
-    /// Entries (row, column, value) of K in the columns of the prescribed dofs, row by row.
-    columns: Vec<(u32, u32, f64)>,
+    /// The entries (row, column, value) of K that were eliminated in the columns of the prescribed dofs, row by row.
+    /// [`Loads::reload`] needs them; empty where it is not used.
+    pub eliminated: Vec<(u32, u32, f64)>,
     /// Present value of `K[c][c]` of prescribed dofs c.
-    diagonal: f64,
+    pub diagonal: f64,
 }
 
 impl Loads {
@@ -561,12 +554,12 @@ impl Loads {
     /// same prescribed dofs (dof, value).
     pub fn reload(&mut self, load: Vec<f64>, initial: &InitialLoad, mut prescribed: Vec<(usize, f64)>) {
         let n = load.len();
-        let (mut value, mut has_row, scale) = (vec![None; n], vec![false; n], self.held.diagonal);
+        let (mut value, mut has_row, scale) = (vec![None; n], vec![false; n], self.diagonal);
         prescribed.iter().for_each(|&(dof, u)| value[dof] = Some(u));
         let is_moved = prescribed.iter().any(|&(_, u)| u != 0.0);
         self.lifting = if is_moved { vec![0.0; n] } else { Vec::new() };
         self.strain_constant = 0.0;
-        for &(i, j, k) in &self.held.columns {
+        for &(i, j, k) in &self.eliminated {
             let (i, j) = (i as usize, j as usize);
             has_row[i] |= i == j;
             let of_column = k * value[j].unwrap_or(0.0);
@@ -616,19 +609,19 @@ pub fn support(stiffness: &mut Csr, load: Vec<f64>, initial: &InitialLoad, presc
     let free: Vec<f64> =
         (0..n).filter(|&i| is_free[i]).filter_map(|i| stiffness.position(i, i).map(|k| stiffness.values[k])).collect();
     let diagonal = if free.is_empty() { 1.0 } else { free.iter().sum::<f64>() / free.len() as f64 };
-    let mut columns = Vec::new();
+    let mut eliminated = Vec::new();
     for i in 0..n {
         for k in stiffness.range(i) {
             let j = stiffness.col[k] as usize;
             if !is_free[j] {
-                columns.push((i as u32, j as u32, stiffness.values[k]));
+                eliminated.push((i as u32, j as u32, stiffness.values[k]));
             }
             if !(is_free[i] && is_free[j]) {
                 stiffness.values[k] = if i == j { diagonal } else { 0.0 };
             }
         }
     }
-    let mut loads = Loads { held: Couplings { columns, diagonal }, ..Loads::default() };
+    let mut loads = Loads { eliminated, diagonal, ..Loads::default() };
     loads.reload(load, initial, prescribed);
     loads
 }

@@ -128,15 +128,6 @@ pub fn to_common_point<const D: usize>(motions: &[&RigidMotion<D>]) -> Vec<[f64;
     shifts
 }
 
-/// The rigid motions of a free body at its dofs.
-#[derive(Clone, Copy)]
-pub struct AtDofs<'a> {
-    /// Number of motions.
-    pub count: usize,
-    /// Value of a motion at a dof.
-    pub at: &'a dyn Fn(usize, usize) -> f64,
-}
-
 /// Return the rigid motions of a body. A body of revolution has only the translation along its axis.
 pub fn of<const D: usize>(extent: &PointExtent, axisymmetric: bool) -> Vec<RigidMotion<D>> {
     let mut all = modes(extent);

@@ -22,7 +22,7 @@ pub fn surface_load<const D: usize>(
 ) -> NodalForces<D> {
     let surface_nodes = facets.distinct_nodes();
     let mut load = vec![0.0; D * surface_nodes.len()];
-    visit(space, facets, &rule(space), |FacetPoint { nodes, phi, weight, x, normal }| {
+    visit(space, facets, &rule(space), |SurfacePoint { nodes, phi, weight, x, normal }| {
         let force = traction(x, normal);
         for (a, at) in nodes.iter().enumerate().filter_map(|(a, &node)| Some((a, place(&surface_nodes, node)?))) {
             for c in 0..D {
@@ -34,7 +34,7 @@ pub fn surface_load<const D: usize>(
 }
 
 /// An integration point of a surface.
-struct FacetPoint<'a, const D: usize> {
+struct SurfacePoint<'a, const D: usize> {
     /// Nodes of the facet.
     nodes: &'a [u32],
     /// Values of the shape functions.
@@ -47,7 +47,7 @@ struct FacetPoint<'a, const D: usize> {
 }
 
 /// Visit the integration points of a surface.
-fn visit<const D: usize>(space: &Space<D>, facets: &Facets<D>, rule: &Rule, mut each: impl FnMut(FacetPoint<D>)) {
+fn visit<const D: usize>(space: &Space<D>, facets: &Facets<D>, rule: &Rule, mut each: impl FnMut(SurfacePoint<D>)) {
     for index in 0..facets.count() {
         let x = facets.coordinates(index, space);
         for (l, weight) in rule.iter() {
@@ -57,7 +57,7 @@ fn visit<const D: usize>(space: &Space<D>, facets: &Facets<D>, rule: &Rule, mut 
             let phi = element::values(space.order, l);
             let at = element::interpolate(&x, &phi);
             let weight = weight * measure * space.circle(&at);
-            each(FacetPoint { nodes: facets.facet(index), phi, weight, x: at, normal });
+            each(SurfacePoint { nodes: facets.facet(index), phi, weight, x: at, normal });
         }
     }
 }
@@ -70,7 +70,7 @@ pub fn foundation<const D: usize>(
     stiffness: &dyn Fn([f64; D], [f64; D]) -> [[f64; D]; D],
 ) -> Vec<NodalBlock<D>> {
     let mut blocks = Vec::new();
-    visit(space, facets, &rule(space), |FacetPoint { nodes, phi, weight, x, normal }| {
+    visit(space, facets, &rule(space), |SurfacePoint { nodes, phi, weight, x, normal }| {
         let density = stiffness(x, normal);
         for (a, &first) in nodes.iter().enumerate() {
             for (b, &second) in nodes.iter().enumerate() {

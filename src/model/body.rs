@@ -9,7 +9,7 @@ use crate::file::available_memory;
 use crate::linalg::{Csr, dot};
 use crate::petsc::{Schur, Session};
 use crate::solver::options::Chosen;
-use crate::solver::{BodyCounts, Dense, InterfaceDofs, MakeSolver, SolveOutcome, SpringMatrix, rows_of};
+use crate::solver::{BodyCounts, Dense, MakeSolver, SolveOutcome, SpringMatrix, rows_of};
 use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::Instant;
@@ -61,7 +61,8 @@ struct Interior {
     chosen: Chosen,
     /// Number of dofs of a node.
     dimension: usize,
-    interface: InterfaceDofs,
+    /// Interface dofs, sorted.
+    interface: Vec<usize>,
     /// The loads on all dofs of the body.
     whole: Loads,
     /// The factor, once the interior is eliminated.
@@ -113,7 +114,7 @@ impl Body {
         body.with_solver(stiffness, Box::new(Dense::make))
     }
 
-    /// Return a body that is to be condensed to its interface dofs. `stiffness`, `whole` and `unconstrained_modes` are
+    /// Return a body that is to be condensed to its `interface` dofs, which are its `dofs`. `stiffness` and `whole` are
     /// on all dofs.
     pub fn to_condense(
         session: Session,
@@ -121,13 +122,10 @@ impl Body {
         dimension: usize,
         stiffness: Csr,
         whole: Loads,
-        unconstrained_modes: &[Vec<f64>],
-        interface: InterfaceDofs,
+        dofs: Dofs,
+        interface: Vec<usize>,
     ) -> Self {
-        let on_interface = |motion: &Vec<f64>| interface.dofs.iter().map(|&dof| motion[dof]).collect();
-        let modes = unconstrained_modes.iter().map(on_interface).collect();
-        let dofs = Dofs::new(interface.dofs.len(), Vec::new(), interface.rows.clone(), modes, None);
-        let words = interface.in_words();
+        let words = format!("condensed to {} dofs by mumps", interface.len());
         let interior =
             Some(Interior { session, chosen, dimension, interface, whole, schur: None, eliminations: 0, seconds: 0.0 });
         let stiffness = Stiffness::Waiting(stiffness, Box::new(Dense::make));
@@ -331,7 +329,7 @@ impl Interior {
         let (began, name) = (Instant::now(), self.chosen.name());
         let lower = whole.lower_triangle();
         drop(whole);
-        let (dofs, interface) = (self.whole.load.len(), &self.interface.dofs);
+        let (dofs, interface) = (self.whole.load.len(), &self.interface);
         let controls = self.chosen.controls_of_mumps(&self.session);
         let mut schur = Schur::analyse(&self.session, &controls, self.dimension, dofs, &lower, interface)?;
         drop(lower);
@@ -366,7 +364,7 @@ impl Interior {
     fn loads(&self) -> Result<Loads> {
         let Self { interface, whole, .. } = self;
         let Loads { load, lifting: whole_lifting, .. } = whole;
-        let at_rest = vec![0.0; interface.dofs.len()];
+        let at_rest = vec![0.0; interface.len()];
         self.with_factor(|schur| {
             let lifting = if whole_lifting.is_empty() { Vec::new() } else { schur.condense(whole_lifting)? };
             let reduced = schur.condense(load)?;

@@ -2,7 +2,7 @@
 //! and how its dofs are distributed over the ranks.
 
 use crate::exchange::{Exchange, Serial, all_gather};
-use crate::fem::Loads;
+use crate::fem::{Loads, Prolongation};
 use crate::linalg::{Csr, axpy, dot};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -53,14 +53,20 @@ impl Dofs {
         let products = match &distribution {
             None => DMatrix::from_fn(motions, motions, |i, j| dot(&unconstrained_modes[i], &unconstrained_modes[j])),
             Some(distribution) => {
-                let place = |dof: usize| distribution.owned_positions.binary_search(&(dof as u32)).ok();
-                rows = rows.of_columns(distribution.owned_positions.len(), place);
+                rows = rows.of_columns(distribution.own.len(), |dof| distribution.owned_index(dof));
                 unconstrained_modes.iter_mut().for_each(|motion| *motion = distribution.of_known(motion));
                 distribution.products.clone()
             }
         };
         let Some(inverse) = products.try_inverse() else { unreachable!("rigid motions of a body are independent") };
         Self { count: dofs, prescribed, rows, unconstrained_modes, inverse, distribution }
+    }
+
+    /// Return the `interface` dofs of a condensed body. Its contact rows and motions are on all dofs.
+    pub fn on_interface(interface: &[usize], rows: &Csr, unconstrained_modes: &[Vec<f64>]) -> Self {
+        let rows = rows.of_columns(interface.len(), |dof| interface.binary_search(&dof).ok());
+        let modes = unconstrained_modes.iter().map(|motion| interface.iter().map(|&dof| motion[dof]).collect());
+        Self::new(interface.len(), Vec::new(), rows, modes.collect(), None)
     }
 
     /// Return whether this rank owns the body.
@@ -140,7 +146,7 @@ impl Dofs {
 
 /// The distribution of the dofs of a body over the ranks, as one of them sees it: the dofs that it owns, and their
 /// places in the distributed matrix that has their rows of K. The matrix is that of all bodies, or one of the body's
-/// own.
+/// own. A rank numbers the dofs of its owned and ghost nodes, its local dofs, for itself.
 ///
 /// A vector has the dofs that this rank owns, so that products are sums over ranks.
 #[derive(Clone, Serialize, Deserialize)]
@@ -149,11 +155,19 @@ pub struct Distribution {
     pub dofs: usize,
     /// The dofs that this rank owns, sorted.
     pub own: Vec<u32>,
-    /// Their positions among the dofs of the owned and ghost nodes of this rank, sorted.
+    /// Their positions among the local dofs, sorted.
     pub owned_positions: Vec<u32>,
-    /// For each other rank, the ghost dofs that it owns: their positions among the dofs of the owned and ghost nodes,
-    /// and their rows in the matrix.
+    /// For each other rank, the ghost dofs that it owns: their positions among the local dofs, and their rows in the
+    /// matrix.
     pub ghosts: Vec<(Vec<u32>, Vec<u32>)>,
+    /// Local indices of the nodes from which displacements are interpolated; empty if no interpolation is requested.
+    pub coarse_nodes: Vec<u32>,
+    /// Numbers of these nodes among the coarse nodes of all bodies in the matrix.
+    pub coarse_number: Vec<u32>,
+    /// Number of coarse nodes of these bodies on all ranks.
+    pub coarse_count: usize,
+    /// Number of coarse nodes of this body that this rank owns.
+    pub own_coarse: usize,
     /// Products, over all dofs of the body, of the rigid motions that its supports leave free.
     pub products: DMatrix<f64>,
     /// Row of the first owned dof of the body in the matrix; the others follow.
@@ -176,8 +190,7 @@ fn alone() -> Rc<dyn Exchange> {
 }
 
 impl Distribution {
-    /// Return the values at the dofs of the owned and ghost nodes of this rank, from those at the owned dofs of every
-    /// rank. Collective.
+    /// Return the values at the local dofs from those at the owned dofs of every rank. Collective.
     pub fn with_ghosts(&self, own: &[f64]) -> Vec<f64> {
         let ghosts: usize = self.ghosts.iter().map(|(positions, _)| positions.len()).sum();
         let mut known = vec![0.0; self.owned_positions.len() + ghosts];
@@ -190,10 +203,47 @@ impl Distribution {
         known
     }
 
-    /// Return the loads and prescribed values of a body on the owned dofs, from those on the dofs of owned and ghost
-    /// nodes.
+    /// Return the index of a local dof among the owned ones; `None` for a ghost.
+    pub fn owned_index(&self, dof: usize) -> Option<usize> {
+        self.owned_positions.binary_search(&(dof as u32)).ok()
+    }
+
+    /// Restrict K, which was assembled for owned nodes, to the owned dofs. Its columns become those of the matrix.
+    pub fn restrict_stiffness(&self, stiffness: Csr) -> Csr {
+        let mut number = vec![0; stiffness.columns];
+        self.owned_positions.iter().zip(self.first..).for_each(|(&dof, row)| number[dof as usize] = row as i32);
+        let ghosts = self.ghosts.iter().flat_map(|(positions, rows)| positions.iter().zip(rows));
+        ghosts.for_each(|(&dof, &row)| number[dof as usize] = row as i32);
+        let Csr { ptr, mut col, mut values, .. } = stiffness;
+        let mut starts = vec![0];
+        let mut row = Vec::new();
+        for &dof in &self.owned_positions {
+            let range = ptr[dof as usize] as usize..ptr[dof as usize + 1] as usize;
+            row.clear();
+            row.extend(range.clone().map(|k| (number[col[k] as usize], values[k])));
+            row.sort_unstable_by_key(|entry| entry.0);
+            for (k, &(j, value)) in range.clone().zip(&row) {
+                (col[k], values[k]) = (j, value);
+            }
+            starts.push(range.end as i32);
+        }
+        Csr { columns: self.total, ptr: starts, col, values }
+    }
+
+    /// Return the rows of owned dofs of an interpolation from the coarse nodes, each of which has `dimension` dofs.
+    /// Columns are numbered through all bodies in the matrix.
+    pub fn restrict_interpolation(&self, whole: &Prolongation, dimension: usize) -> Prolongation {
+        let number = |j: usize| dimension * self.coarse_number[j / dimension] as usize + j % dimension;
+        let mut rows = Csr::new(dimension * self.coarse_count);
+        for &dof in &self.owned_positions {
+            rows.push_row(whole.rows.row(dof as usize).map(|(j, weight)| (number(j), weight)));
+        }
+        Prolongation { rows, own: dimension * self.own_coarse }
+    }
+
+    /// Return the loads and prescribed values of a body on the owned dofs, from those on the local dofs.
     pub fn restrict(&self, loads: Loads) -> Loads {
-        let place = |&(dof, u): &(usize, f64)| Some((self.owned_positions.binary_search(&(dof as u32)).ok()?, u));
+        let place = |&(dof, u): &(usize, f64)| Some((self.owned_index(dof)?, u));
         Loads {
             load: self.of_known(&loads.load),
             prescribed: loads.prescribed.iter().filter_map(place).collect(),
@@ -202,7 +252,7 @@ impl Distribution {
         }
     }
 
-    /// Return the values at owned dofs from those at the dofs of owned and ghost nodes.
+    /// Return the values at owned dofs from those at the local dofs.
     pub fn of_known(&self, known: &[f64]) -> Vec<f64> {
         self.owned_positions.iter().map(|&at| known[at as usize]).collect()
     }

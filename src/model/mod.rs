@@ -18,7 +18,7 @@ pub mod rigid_parts;
 
 pub use crate::solver::cost::{BodyFacts, slenderness};
 pub use crate::solver::preset::INNER_TOLERANCE;
-pub use crate::solver::{BodyCounts, InterfaceDofs};
+pub use crate::solver::{BodyCounts, interface_dofs};
 pub use body::Body;
 pub use compliance::ComplianceStep;
 pub use dofs::{Distribution, Dofs};

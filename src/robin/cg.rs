@@ -105,7 +105,7 @@ pub(super) fn conjugate_gradients(
     (enough, most): (&mut StoppingTest, usize),
     least: f64,
 ) -> Result<Solved<(LinearSolution, Lanczos)>> {
-    let mut state = Gradients::new(model, springs, residual, least);
+    let mut state = ConjugateGradients::new(model, springs, residual, least);
     let squared = loop {
         let before = state.previous.as_ref().map_or(&state.r, |previous| &previous.residual);
         let sweep = sweeper.precondition(model, state.r.clone(), before)?;
@@ -126,13 +126,13 @@ pub(super) fn conjugate_gradients(
         }
         state.previous = Some(Previous { direction, decrement: rz, residual });
     };
-    let Gradients { x, lanczos, .. } = state;
+    let ConjugateGradients { x, lanczos, .. } = state;
     let solution = LinearSolution { field: x, energy: lanczos.energy, error: squared.max(0.0).sqrt(), is_exact: false };
     Ok(Ok((solution, lanczos)))
 }
 
 /// Conjugate gradients under way.
-struct Gradients<'a> {
+struct ConjugateGradients<'a> {
     /// omega kappa, n.
     springs: &'a [f64],
     /// Z'HZ.
@@ -154,7 +154,7 @@ struct Previous {
     residual: Vec<Vec<f64>>,
 }
 
-impl<'a> Gradients<'a> {
+impl<'a> ConjugateGradients<'a> {
     /// Start with the solution in the space of rigid motions.
     fn new(model: &Model, springs: &'a [f64], residual: &[Vec<f64>], least: f64) -> Self {
         let motions = Motions::of(model);

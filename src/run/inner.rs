@@ -8,7 +8,7 @@ use crate::error::{Error, Kind, Result};
 use crate::fem::Prolongation;
 use crate::file::available_memory;
 use crate::linalg::Csr;
-use crate::model::{Body, BodyCounts, LinearStep};
+use crate::model::{Body, BodyCounts, Dofs, LinearStep};
 use crate::parallel::least;
 use crate::petsc::{HAS_HYPRE, Rows, Session};
 use crate::problem::{Linear, MethodName, Preset};
@@ -17,7 +17,7 @@ use crate::solver::cost::BodyFacts;
 use crate::solver::names::WHOLE;
 use crate::solver::options::{Chosen, UserOptions};
 use crate::solver::preset::{self, Smoother};
-use crate::solver::{InterfaceDofs, Krylov, MakeSolver};
+use crate::solver::{Krylov, MakeSolver};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A factory that makes the inner solvers of a scene's bodies by its plan.
@@ -288,9 +288,9 @@ fn eliminates(plan: &Plan, asked: &SolverRequest, body: usize) -> bool {
 impl Factory for SolverFactory<'_> {
     type SolverPlan = Plan;
 
-    fn plan(&mut self, bodies: Vec<(BodyFacts, InterfaceDofs)>, is_kept: &mut [bool]) -> Result<Plan> {
+    fn plan(&mut self, bodies: Vec<(BodyFacts, Vec<usize>)>, is_kept: &mut [bool]) -> Result<Plan> {
         preset::check(self.asked.preset, HAS_HYPRE)?;
-        let (mut facts, interfaces): (Vec<BodyFacts>, Vec<InterfaceDofs>) = bodies.into_iter().unzip();
+        let (mut facts, interfaces): (Vec<BodyFacts>, Vec<Vec<usize>>) = bodies.into_iter().unzip();
         let before = self.before.as_ref().map(|before| &before.plan.bodies);
         for (index, body) in facts.iter_mut().enumerate() {
             let was_condensed =
@@ -365,8 +365,8 @@ impl Factory for SolverFactory<'_> {
         let planned = &mut self.plan.bodies[index];
         let (session, chosen) = (self.session.clone(), planned.facts.options.clone());
         if let Some(interface) = planned.interface.take() {
-            let modes = &unconstrained_modes;
-            return Ok(Body::to_condense(session, chosen, dimension, stiffness, loads, modes, interface));
+            let dofs = Dofs::on_interface(&interface, &rows, &unconstrained_modes);
+            return Ok(Body::to_condense(session, chosen, dimension, stiffness, loads, dofs, interface));
         }
         let is_swept = self.plan.linear == Linear::Sweeps;
         let words = preset::in_words(if is_swept { &chosen } else { &self.asked.whole });

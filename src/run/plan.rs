@@ -6,7 +6,6 @@
 
 use crate::parallel::owners;
 use crate::problem::{Linear, MethodName, Preset};
-use crate::solver::InterfaceDofs;
 use crate::solver::cost::{self, BodyFacts};
 use crate::solver::options::Chosen;
 use crate::solver::preset;
@@ -50,7 +49,7 @@ pub struct BodyPlan {
     /// Whether its dofs are distributed over the ranks in a matrix of its own.
     pub is_distributed: bool,
     /// Interface dofs of a condensed body, until it is made.
-    pub interface: Option<InterfaceDofs>,
+    pub interface: Option<Vec<usize>>,
     /// Reason for the preset, in words; other ranks do not get it.
     #[serde(skip)]
     pub reason: String,

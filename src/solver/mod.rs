@@ -2,7 +2,7 @@
 //! contact points.
 //!
 //! A [`SpringMatrix`] holds G = K + B' diag(d) B and solves with it by an [`InnerSolver`]: [`Krylov`] or [`Dense`].
-//! [`InterfaceDofs`] are those of a body that is condensed to its contact. A new way to solve is a new file with an
+//! [`interface_dofs`] are those of a body that is condensed to its contact. A new way to solve is a new file with an
 //! implementation of `InnerSolver`.
 //!
 //! Where a function says nothing else, its errors are failures of the solver library, and PETSc being out of memory.
@@ -17,7 +17,7 @@ pub mod preset;
 mod springs;
 
 pub use dense::Dense;
-pub use interface::InterfaceDofs;
+pub use interface::interface_dofs;
 pub use krylov::Krylov;
 pub use springs::{MakeSolver, MakeSubspace, SpringMatrix};
 
