@@ -423,8 +423,6 @@ impl<'a, const D: usize> SurfacePair<'a, D> {
         let chords = if is_touching { None } else { Chords::of(&a, &b, &common, &pair) };
         let ends = spec.distance.map_or(Vec::new(), |_| contact::ends(&a, &common, &pair, &far));
         let facing = FacingFacets::all(parts, [&a, &b], &common, &pair);
-        // all that the pressure functions of facets are needed for is done
-        pair.cover.iter_mut().for_each(|cover| cover.basis = None);
         let fine = fine.map(Rc::new);
         Ok(Some(Contact {
             pair,

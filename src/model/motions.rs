@@ -136,11 +136,9 @@ impl<'a> Motions<'a> {
     /// Return B E `amounts`, by which each point closes.
     pub fn closing(&self, amounts: &DVector<f64>) -> Vec<f64> {
         let mut closing = vec![0.0; self.points];
-        for (points, motion, trace) in self.traces() {
-            if amounts[motion] != 0.0 {
-                axpy(amounts[motion], trace, &mut closing[points.clone()]);
-            }
-        }
+        self.traces().filter(|(_, motion, _)| amounts[*motion] != 0.0).for_each(|(points, motion, trace)| {
+            axpy(amounts[motion], trace, &mut closing[points.clone()]);
+        });
         closing
     }
 
@@ -188,9 +186,9 @@ impl<'a> Motions<'a> {
     /// Return |(B E)'| |`force`|, the work on each motion that forces at the points of any signs could do.
     pub fn sizes(&self, force: &[f64]) -> DVector<f64> {
         let mut sizes = DVector::zeros(self.count());
-        for (points, motion, trace) in self.traces() {
+        self.traces().for_each(|(points, motion, trace)| {
             sizes[motion] += trace.iter().zip(&force[points.clone()]).map(|(t, f)| (t * f).abs()).sum::<f64>();
-        }
+        });
         sizes
     }
 

@@ -51,6 +51,9 @@ fn by_default() {
         assert!((forces[k] - forces[12 - k]).abs() < 1e-3 * forces[0], "roller {k}: {forces:?}");
     }
     assert!(run.warnings().is_empty(), "{}", run.warnings());
+    // the part of the inner ring before a roller begins and ends within a facet
+    let averaged = (0..12).map(|pair| run.count(&format!("pairs/{pair}/facets_averaged")));
+    assert!(averaged.clone().all(|count| count == 2), "{:?}", averaged.collect::<Vec<_>>());
 }
 
 /// Rings and rollers that are stiff against the layer share the load as in closed form.
