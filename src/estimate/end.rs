@@ -59,7 +59,8 @@ pub(super) struct EndLoads {
     pub facets: BTreeSet<usize>,
 }
 
-/// Closed edges beside the one on which contact ends, whose pressures are fitted together.
+/// Closed edges beside the one on which contact ends, whose pressures are fitted together. For elements of order k these
+/// are 2 k pressures at least, about twice as many as the k + 1 unknowns.
 const BESIDE: usize = 2;
 
 /// Places of the end that are tried. They are equally spaced in the root of the distance from the last closed point, to
