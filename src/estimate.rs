@@ -304,24 +304,18 @@ impl LocalErrors {
             mean_error = recovered.beyond_means(index, &pair.nodal[1]);
         }
         model.exchange.sum(&mut mean_error);
-        let springs: Vec<f64> =
-            range.clone().zip(&mean_error).map(|(q, c)| model.area[q] * layer.tangent[q] * c).collect();
-        let of_layer = LayerError::new(model, points, layer, index, &compression, &mean_error);
         let ends = loads_at_ends(model, points, layer, index);
-        let mut discrete = vec![0.0; points.each.len()];
-        points.pressing.multiply(&layer.pressure[range.clone()], &mut discrete);
-        let pressure = of_layer.pressure.iter().zip(&discrete).zip(&points.each);
-        let force: Vec<f64> = pressure
-            .map(|((p, discrete), point)| -point.weight * if ends.facets.contains(&point.facet) { discrete } else { p })
-            .collect();
-        let at_ends: Vec<f64> = range.clone().zip(&ends.force).map(|(q, force)| model.area[q] * force).collect();
+        let spring =
+            |q: usize| model.area[q] * (layer.tangent[q] * mean_error[q - range.start] - ends.force[q - range.start]);
+        let springs: Vec<f64> = range.clone().map(spring).collect();
+        let of_layer = LayerError::new(model, points, layer, index, &compression, &mean_error, &ends.facets);
+        let force: Vec<f64> = of_layer.pressure.iter().zip(&points.each).map(|(p, point)| -point.weight * p).collect();
         for side in 0..2 {
             let (body, nodal) = (pair.bodies[side], &pair.nodal[side]);
             if let Some(recovered) = &recovered[body] {
                 recovered.add_forces(index, side, &force, &mut self.loads[body]);
                 nodal.add_transpose(1.0, &layer.force[range.clone()], &mut self.loads[body]);
                 nodal.add_transpose(-1.0, &springs, &mut self.loads[body]);
-                nodal.add_transpose(1.0, &at_ends, &mut self.loads[body]);
             }
         }
         self.layers.push(of_layer.energy);

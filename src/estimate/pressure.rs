@@ -3,6 +3,7 @@
 use crate::contact::law::Law;
 use crate::contact::{FinePoint, FinePoints};
 use crate::discretize::meshes::KeptMeshes;
+use crate::linalg::axpy;
 use crate::model::layer::meeting_slopes;
 use crate::model::{Layer, Model};
 use crate::problem::order::Order;
@@ -74,8 +75,9 @@ impl PressureErrors {
     ) -> Self {
         let compression: Vec<f64> = layer.compression.iter().zip(closing).map(|(c, more)| c + more).collect();
         let resolved = Layer::resolve(model, &compression, &layer.linear(&compression), &meeting_slopes(model), &[]);
-        let of_points = resolved.pressure.iter().zip(&layer.pressure).zip(misfit);
-        let error = of_points.map(|((exact, discrete), misfit)| exact - discrete + misfit).collect();
+        let mut error = resolved.pressure;
+        axpy(-1.0, &layer.pressure, &mut error);
+        axpy(1.0, misfit, &mut error);
         let mut errors = Self { error, relative: Vec::new(), ends: Vec::new(), worst: Vec::new(), guesses: Vec::new() };
         for pair in 0..model.pairs.len() {
             errors.add_pair(meshes.points(pair), model, layer, pair);
@@ -234,7 +236,8 @@ pub(super) struct LayerError {
 
 impl LayerError {
     /// Compute the error of pair `index`. `giving` is the closing of the recovered displacements of both bodies at each
-    /// integration point. `beyond` is what the compression of each contact point lacks as a mean.
+    /// integration point. `beyond` is what the compression of each contact point lacks as a mean. On the facets `at_ends`
+    /// the pressure of the discrete problem stands, since loads of their own have the error there.
     pub fn new(
         model: &Model,
         points: &FinePoints,
@@ -242,6 +245,7 @@ impl LayerError {
         index: usize,
         giving: &[f64],
         beyond: &[f64],
+        at_ends: &BTreeSet<usize>,
     ) -> Self {
         let (law, soft, range) = (&model.pairs[index].law, softness(model, index), model.range(index));
         let [compression, pressure, tangent] =
@@ -261,7 +265,8 @@ impl LayerError {
                 discrete += mu * pressure[q];
                 amplified += mu * mu;
             }
-            error.pressure.push(discrete + between.weight_of_law(tangent, amplified) * (p - discrete));
+            let weight = if at_ends.contains(&point.facet) { 0.0 } else { between.weight_of_law(tangent, amplified) };
+            error.pressure.push(discrete + weight * (p - discrete));
         }
         error
     }
